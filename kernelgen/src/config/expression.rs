@@ -1,0 +1,165 @@
+//! `rounds`: integer arithmetic over parameters.
+
+use super::model::{Param, ParamValue, Pipeline};
+use super::suggest;
+use crate::diagnostic::Diagnostic;
+use crate::source::{Span, Spanned};
+use indexmap::IndexMap;
+
+/// Evaluates `rounds`: integers, names of u32 parameters, `+ - * /` (rounding down) and parentheses.
+///
+/// # Errors
+/// K0116 with the place inside the expression: syntax, an unknown or unfit parameter, a result outside of 1 to 2^32-1.
+pub fn evaluate_rounds(pipeline: &Pipeline) -> Result<u32, Diagnostic> {
+    let text = &pipeline.rounds;
+    let mut reader = Reader { text, rest: &text.value, params: &pipeline.params, used: Vec::new(), depth: 0 };
+    let value = reader.sum()?;
+    if reader.peek().is_some() {
+        return Err(reader.error("an operator or the end is missing here"));
+    }
+    let rounds = u32::try_from(value).ok().filter(|rounds| *rounds > 0);
+    rounds.ok_or_else(|| outside(text.span, value, &reader.used))
+}
+
+fn outside(span: Span, value: i64, used: &[(Span, String)]) -> Diagnostic {
+    let mut diagnostic =
+        Diagnostic::error("K0116", format!("`rounds` comes to {value}")).at(span, format!("this is {value}"));
+    for (span, what) in used {
+        diagnostic = diagnostic.also(*span, what);
+    }
+    diagnostic.help(format!("it must come to 1 to {}", u32::MAX))
+}
+
+/// Nesting beyond this is no round count but an attack on the stack.
+const MAX_DEPTH: u32 = 64;
+
+const GRAMMAR: &str = "`rounds` is built of integers, u32 parameters, `+ - * /` and parentheses";
+
+struct Reader<'a> {
+    text: &'a Spanned<String>,
+    rest: &'a str,
+    params: &'a IndexMap<String, Param>,
+    /// Places of the parameters met, and what they are.
+    used: Vec<(Span, String)>,
+    depth: u32,
+}
+
+impl<'a> Reader<'a> {
+    fn sum(&mut self) -> Result<i64, Diagnostic> {
+        let mut value = self.product()?;
+        while let Some(sign @ ('+' | '-')) = self.peek() {
+            self.skip(1);
+            let right = self.product()?;
+            let result = if sign == '+' { value.checked_add(right) } else { value.checked_sub(right) };
+            value = result.ok_or_else(|| self.error("too large a number"))?;
+        }
+        Ok(value)
+    }
+
+    fn product(&mut self) -> Result<i64, Diagnostic> {
+        let mut value = self.operand()?;
+        while let Some(sign @ ('*' | '/')) = self.peek() {
+            self.skip(1);
+            let right = self.operand()?;
+            if sign == '/' && right == 0 {
+                return Err(self.error("a division by 0 ends here"));
+            }
+            let result = if sign == '*' { value.checked_mul(right) } else { value.checked_div(right) };
+            value = result.ok_or_else(|| self.error("too large a number"))?;
+        }
+        Ok(value)
+    }
+
+    fn operand(&mut self) -> Result<i64, Diagnostic> {
+        match self.peek() {
+            Some('(') => self.group(),
+            Some(first) if first.is_ascii_digit() => self.number(),
+            Some(first) if first.is_ascii_alphabetic() || first == '_' => self.parameter(),
+            Some(_) => Err(self.error("no part of an expression")),
+            None => Err(self.error("a number or a parameter is missing here")),
+        }
+    }
+
+    fn group(&mut self) -> Result<i64, Diagnostic> {
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            return Err(self.error("too many parentheses"));
+        }
+        self.skip(1);
+        let value = self.sum()?;
+        if self.peek() != Some(')') {
+            return Err(self.error("a `)` is missing here"));
+        }
+        self.skip(1);
+        self.depth -= 1;
+        Ok(value)
+    }
+
+    fn number(&mut self) -> Result<i64, Diagnostic> {
+        let digits = self.word(|c| c.is_ascii_digit());
+        let value = digits.parse::<u32>().map_err(|_| self.error_at(digits, "too large a number").help(GRAMMAR))?;
+        Ok(i64::from(value))
+    }
+
+    fn parameter(&mut self) -> Result<i64, Diagnostic> {
+        let name = self.word(|c| c.is_ascii_alphanumeric() || c == '_');
+        match self.params.get(name) {
+            Some(Param { value: ParamValue::U32(value), span, .. }) => {
+                self.used.push((*span, format!("`{name}` is {value} in this variant")));
+                Ok(i64::from(*value))
+            }
+            Some(param) => {
+                let unfit = self.error_at(name, "not a whole number").also(param.span, "its type is not u32");
+                Err(unfit.help("`rounds` is built of integers and u32 parameters"))
+            }
+            None => {
+                let whole = |(name, param): (&'a String, &Param)| {
+                    matches!(param.value, ParamValue::U32(_)).then_some(name.as_str())
+                };
+                let candidates = self.params.iter().filter_map(whole);
+                let help = suggest::help(name, "u32 parameters", candidates);
+                Err(self.error_at(name, "no such parameter").help(help))
+            }
+        }
+    }
+
+    fn word(&mut self, belongs: impl Fn(char) -> bool) -> &'a str {
+        let end = self.rest.find(|c| !belongs(c)).unwrap_or(self.rest.len());
+        let (word, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        word
+    }
+
+    fn peek(&mut self) -> Option<char> {
+        self.rest = self.rest.trim_start();
+        self.rest.chars().next()
+    }
+
+    fn skip(&mut self, bytes: usize) {
+        self.rest = &self.rest[bytes..];
+    }
+
+    /// An error at the next character.
+    fn error(&self, label: &str) -> Diagnostic {
+        let length = self.rest.chars().next().map_or(0, char::len_utf8);
+        self.error_at(&self.rest[..length], label).help(GRAMMAR)
+    }
+
+    /// An error at a part of the text.
+    fn error_at(&self, part: &str, label: &str) -> Diagnostic {
+        let offset = part.as_ptr() as usize - self.text.value.as_ptr() as usize;
+        Diagnostic::error("K0116", format!("`rounds = \"{}\"` cannot be evaluated", self.text.value))
+            .at(self.span(offset, part.len()), label)
+    }
+
+    /// Where a part of the value stands: the value begins after its quote, unless escapes make the lengths differ.
+    fn span(&self, offset: usize, length: usize) -> Span {
+        let whole = self.text.span;
+        let quotes = (whole.end - whole.start) as usize - self.text.value.len();
+        if quotes != 0 && quotes != 2 {
+            return whole;
+        }
+        let start = whole.start + (quotes / 2 + offset) as u32;
+        Span { file: whole.file, start, end: start + length as u32 }
+    }
+}

@@ -1,0 +1,279 @@
+//! A variant: one choice from each axis, parsed and checked, with the place where everything was written.
+
+use super::quantity::Quantity;
+use crate::source::{Span, Spanned};
+use indexmap::IndexMap;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Which file of each axis to combine, and what to override.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// Config key of the pipeline, `pipelines/pt.toml`.
+    pub pipeline: String,
+    /// Config key of the layout, `layouts/soa.toml`.
+    pub layout: String,
+    /// Config key of the schedule, `schedules/wavefront.toml`.
+    pub schedule: String,
+    /// Config key of the precision, `precisions/f32.toml`.
+    pub precision: String,
+    /// `--set KEY=VALUE`, in order; later wins. KEY is a parameter, a dotted key of an axis (`schedule.workgroup`) or its unambiguous short name (`workgroup`).
+    pub set: Vec<(String, String)>,
+    /// The effects of the scene.
+    pub effects: Effects,
+}
+
+/// The effects that a scene may call for: name (`sky`) to presence and the reason.
+pub type Effects = BTreeMap<String, Effect>;
+
+/// Whether a scene calls for an effect, and why.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Effect {
+    /// Whether the scene has it.
+    pub present: bool,
+    /// What in the scene decides it: `material "bottle" transmits`.
+    pub reason: String,
+}
+
+/// One choice from each axis.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// What is computed.
+    pub pipeline: Pipeline,
+    /// Where fields live.
+    pub layout: Layout,
+    /// How stages become kernels.
+    pub schedule: Schedule,
+    /// In what arithmetic.
+    pub precision: Precision,
+    /// Which effects exist, pins (`[features]` in a config, `--set features.sky=true`) applied.
+    pub effects: Effects,
+}
+
+/// What is computed: records, state, streams, parameters, stages and their wiring.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    /// The pipeline's name.
+    pub name: String,
+    /// One line about it.
+    pub doc: String,
+    /// The stage every path slot begins with.
+    pub start: Spanned<String>,
+    /// Upper bound of the rounds after which no path is alive: an arithmetic expression over integers and u32 parameters.
+    pub rounds: Spanned<String>,
+    /// Parameters by name.
+    pub params: IndexMap<String, Param>,
+    /// Records by name.
+    pub records: IndexMap<String, Record>,
+    /// Instances: name to record name; one of each for every path slot.
+    pub state: IndexMap<String, Spanned<String>>,
+    /// Streams by name.
+    pub streams: IndexMap<String, Stream>,
+    /// Stages by name, in the order in which a round runs them.
+    pub stages: IndexMap<String, Stage>,
+}
+
+/// A parameter: a constant in every kernel, set with `--set`.
+#[derive(Clone, Debug)]
+pub struct Param {
+    /// Where its table or value stands.
+    pub span: Span,
+    /// Its value, with its type.
+    pub value: ParamValue,
+    /// What it means.
+    pub doc: String,
+}
+
+/// The value of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParamValue {
+    /// `type = "u32"`.
+    U32(u32),
+    /// `type = "real"`.
+    Real(f64),
+    /// `type = "bool"`.
+    Bool(bool),
+    /// `type = "choice", of = [..]`: an index into the names.
+    Choice {
+        /// Legal words.
+        of: Vec<String>,
+        /// The chosen one.
+        index: u32,
+    },
+}
+
+/// A record: fields by name.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// Where the record's table starts.
+    pub span: Span,
+    /// Fields by name, in order.
+    pub fields: IndexMap<String, Field>,
+}
+
+/// A field of a record.
+#[derive(Clone, Debug)]
+pub struct Field {
+    /// Where its line stands.
+    pub span: Span,
+    /// What it is.
+    pub quantity: Quantity,
+}
+
+/// A stream: records appended by stages, emptied by its consumer.
+#[derive(Clone, Debug)]
+pub struct Stream {
+    /// Where its table stands.
+    pub span: Span,
+    /// The record's name.
+    pub record: Spanned<String>,
+    /// The consuming stage function.
+    pub consumer: Spanned<String>,
+    /// What its consumer's rays are counted as.
+    pub rays: Option<RayKind>,
+}
+
+/// A stage: a WGSL function and where each of its outcomes leads.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// Where its table or line stands.
+    pub span: Span,
+    /// The WGSL function; the stage's own name when not given.
+    pub entry: Spanned<String>,
+    /// Function parameter to instance, where they differ: `with.walk = "eye"`.
+    pub with: IndexMap<String, Spanned<String>>,
+    /// Outcome (lower case) to stage, or to `end`.
+    pub on: IndexMap<String, Spanned<String>>,
+    /// What rays of this stage are counted as.
+    pub rays: Option<RayKind>,
+}
+
+/// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RayKind {
+    /// `rays = "walk"`.
+    Walk,
+    /// `rays = "visibility"`.
+    Visibility,
+}
+
+/// Where fields live.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    /// The layout's name.
+    pub name: String,
+    /// One line about it.
+    pub doc: String,
+    /// How the records of different paths are interleaved.
+    pub order: Order,
+    /// 32-bit words per access: 1, 2 or 4.
+    pub lane: u32,
+    /// Whether fields that no kernel boundary carries are dropped.
+    pub drop_dead: bool,
+    /// Table name to instances; empty means one table named `state`.
+    pub tables: IndexMap<String, Vec<Spanned<String>>>,
+    /// Explicit placement; empty means automatic. One row is one lane.
+    pub place: Vec<PlacedRow>,
+    /// Where the layout's table stands, for errors about it as a whole.
+    pub span: Span,
+}
+
+/// Interleaving.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Order {
+    /// All words of a path side by side.
+    Aos,
+    /// One plane per lane.
+    Soa,
+    /// Blocks of this many paths, one plane per lane inside a block: `order = "aosoa32"`.
+    Aosoa(u32),
+}
+
+/// One row of an explicit placement: `["light.throughput", "light.mis"]`.
+#[derive(Clone, Debug)]
+pub struct PlacedRow {
+    /// Where it stands.
+    pub span: Span,
+    /// Its parts, in order of words.
+    pub parts: Vec<Placed>,
+}
+
+/// A part of a row.
+#[derive(Clone, Debug)]
+pub enum Placed {
+    /// Whole words of a field, `"light.throughput"`, or one unused word, `"_"`.
+    Words(PlacedField),
+    /// One word shared by several fields below a word, `["eye.flags:8", "_:24"]`, from the lowest bit up.
+    Bits(Vec<PlacedField>),
+}
+
+/// A field in a placement.
+#[derive(Clone, Debug)]
+pub struct PlacedField {
+    /// Where it stands.
+    pub span: Span,
+    /// `None` for `_`.
+    pub field: Option<String>,
+    /// Bits given after the colon.
+    pub bits: Option<u32>,
+}
+
+/// How stages become kernels.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    /// The schedule's name.
+    pub name: String,
+    /// One line about it.
+    pub doc: String,
+    /// How a survivor finds its place in the next queue.
+    pub queue: QueueKind,
+    /// Threads in a workgroup.
+    pub workgroup: Spanned<u32>,
+    /// How the film adds.
+    pub accumulate: Accumulate,
+    /// Streams resolved by a kernel of their own; the others inline.
+    pub batch: Vec<Spanned<String>>,
+}
+
+/// How a survivor finds its place in a queue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum QueueKind {
+    /// One atomic a path.
+    Atomic,
+    /// One atomic a subgroup.
+    Subgroup,
+}
+
+/// How the film adds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Accumulate {
+    /// Float atomics: fast, sums in any order.
+    AtomicF32,
+    /// 64-bit fixed point, units of 2^-24: the same sum in any order.
+    FixedI64,
+    /// Plain read-add-write: loses splats.
+    Racy,
+}
+
+/// In what arithmetic.
+#[derive(Clone, Debug)]
+pub struct Precision {
+    /// The precision's name.
+    pub name: String,
+    /// One line about it.
+    pub doc: String,
+    /// What `real` means.
+    pub real: Real,
+}
+
+/// What `real` means in every stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Real {
+    /// 32-bit IEEE.
+    F32,
+}

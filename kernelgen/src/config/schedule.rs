@@ -1,0 +1,89 @@
+//! The schedule axis and the precision axis.
+
+use super::merge::AxisFile;
+use super::model::{Accumulate, Precision, QueueKind, Real, Schedule};
+use super::section::{Findings, Item, Section};
+use super::tree::Data;
+use crate::diagnostic::Diagnostic;
+use crate::source::Spanned;
+
+/// Keys of `[schedule]`.
+pub const KEYS: [&str; 7] = ["fuse", "queue", "workgroup", "load", "until", "accumulate", "batch"];
+/// Keys of `[precision]`.
+pub const PRECISION_KEYS: [&str; 1] = ["real"];
+
+const WORKGROUPS: [u32; 6] = [32, 64, 128, 256, 512, 1024];
+
+/// The schedule; `None` when a required key is missing or refused.
+pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Option<Schedule> {
+    let section = top.require("schedule", "write `[schedule]`", findings)?.section(findings)?;
+    section.allow(&KEYS, findings);
+    check_fixed(&section, findings);
+    let queue = word(&section, "queue", &["atomic", "subgroup"], findings);
+    let workgroup = section.require("workgroup", "threads in a workgroup: `workgroup = 64`", findings);
+    let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
+    let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
+    let batch = section.get("batch").and_then(|item| names(&item, findings));
+    Some(Schedule {
+        name: file.name.clone(),
+        doc: file.doc.clone(),
+        queue: [QueueKind::Atomic, QueueKind::Subgroup][queue?],
+        workgroup: workgroup?,
+        accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
+        batch: batch.unwrap_or_default(),
+    })
+}
+
+/// The precision; `None` when `real` is missing or refused.
+pub fn read_precision(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Option<Precision> {
+    let section = top.require("precision", "write `[precision]`", findings)?.section(findings)?;
+    section.allow(&PRECISION_KEYS, findings);
+    let real = word(&section, "real", &["f32"], findings)?;
+    Some(Precision { name: file.name.clone(), doc: file.doc.clone(), real: [Real::F32][real] })
+}
+
+/// A required word, as an index.
+fn word(section: &Section<'_>, key: &str, words: &[&str], findings: &mut Findings) -> Option<usize> {
+    let help = format!("write `{key} = \"{}\"`", words.join("\"` or `\""));
+    section.require(key, &help, findings)?.word(words, findings)
+}
+
+/// The keys that have only one value so far.
+fn check_fixed(section: &Section<'_>, findings: &mut Findings) {
+    if let Some(load) = section.get("load") {
+        load.word(&["entry"], findings);
+    }
+    if let Some(until) = section.get("until") {
+        until.word(&["empty"], findings);
+    }
+    let fuse = section.get("fuse");
+    if let Some(fuse) = fuse.filter(|fuse| !matches!(&fuse.node.data, Data::List(list) if list.is_empty())) {
+        let fused = Diagnostic::error("K0107", "stages cannot be fused yet")
+            .at(fuse.span(), "only `[]`, every stage a kernel of its own, is available")
+            .help("write `fuse = []`");
+        findings.push(fused);
+    }
+}
+
+fn workgroup_size(item: &Item<'_>, findings: &mut Findings) -> Option<Spanned<u32>> {
+    let Data::Integer(number) = item.node.data else {
+        return item.integer(32..=1024, findings).map(|value| Spanned { value, span: item.span() });
+    };
+    let size = WORKGROUPS.into_iter().find(|size| i128::from(*size) == number);
+    if size.is_none() {
+        let sizes: Vec<String> = WORKGROUPS.iter().map(u32::to_string).collect();
+        let refused = Diagnostic::error("K0107", format!("`{}` cannot be {number}", item.path))
+            .at(item.span(), "not a power of two from 32 to 1024")
+            .help(format!("`workgroup` is one of {}", sizes.join(", ")));
+        findings.push(refused);
+    }
+    size.map(|value| Spanned { value, span: item.span() })
+}
+
+/// A list of names; one name alone is a list of one, which spares quotes in `--set batch=connection`.
+fn names(item: &Item<'_>, findings: &mut Findings) -> Option<Vec<Spanned<String>>> {
+    match item.node.data {
+        Data::Text(_) => item.text(findings).map(|text| vec![text]),
+        _ => item.texts(findings),
+    }
+}

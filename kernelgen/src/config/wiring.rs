@@ -1,0 +1,168 @@
+//! Do the parts of a variant fit? Every name that one part says must exist in the other.
+
+use super::expression;
+use super::model::{Field, Layout, Pipeline, Placed, PlacedField, Variant};
+use super::section::Findings;
+use super::suggest;
+use crate::diagnostic::Diagnostic;
+use crate::source::{Span, Spanned};
+use indexmap::IndexMap;
+
+/// The target that stands for no stage.
+const END: &str = "end";
+
+/// Checks all names that configs alone decide.
+pub fn check(variant: &Variant, findings: &mut Findings) {
+    let pipeline = &variant.pipeline;
+    check_records(pipeline, findings);
+    check_names(pipeline, findings);
+    check_stages(pipeline, findings);
+    check_rounds(pipeline, findings);
+    for stream in &variant.schedule.batch {
+        check_known(("K0214", "stream"), stream, &pipeline.streams, findings);
+    }
+    check_tables(&variant.layout, pipeline, findings);
+    check_places(&variant.layout, pipeline, findings);
+}
+
+/// Instances and streams name records.
+fn check_records(pipeline: &Pipeline, findings: &mut Findings) {
+    let streams = pipeline.streams.values().map(|stream| &stream.record);
+    for record in pipeline.state.values().chain(streams) {
+        check_known(("K0201", "record"), record, &pipeline.records, findings);
+    }
+}
+
+/// Names that become declarations of the same WGSL text.
+fn check_names(pipeline: &Pipeline, findings: &mut Findings) {
+    if let Some(end) = pipeline.stages.get(END) {
+        let taken = Diagnostic::error("K0216", "no stage can be named `end`")
+            .at(end.span, "`end` in `on.x = \"end\"` means that the path is over")
+            .help("give the stage another name");
+        findings.push(taken);
+    }
+    for (name, record) in &pipeline.records {
+        if let Some(param) = pipeline.params.get(name) {
+            let twice = Diagnostic::error("K0115", format!("`{name}` is both a parameter and a record"))
+                .at(param.span, "the parameter")
+                .also(record.span, "the record")
+                .help("give one of them another name");
+            findings.push(twice);
+        }
+    }
+}
+
+fn check_stages(pipeline: &Pipeline, findings: &mut Findings) {
+    check_known(("K0202", "stage"), &pipeline.start, &pipeline.stages, findings);
+    for stage in pipeline.stages.values() {
+        for target in stage.on.values().filter(|target| target.value != END) {
+            check_known(("K0202", "stage"), target, &pipeline.stages, findings);
+        }
+        for instance in stage.with.values() {
+            check_known(("K0206", "instance"), instance, &pipeline.state, findings);
+        }
+    }
+}
+
+fn check_rounds(pipeline: &Pipeline, findings: &mut Findings) {
+    if is_missing(&pipeline.rounds) {
+        return;
+    }
+    if let Err(diagnostic) = expression::evaluate_rounds(pipeline) {
+        findings.push(diagnostic);
+    }
+}
+
+/// Layout tables name instances.
+fn check_tables(layout: &Layout, pipeline: &Pipeline, findings: &mut Findings) {
+    for instance in layout.tables.values().flatten() {
+        check_known(("K0401", "instance"), instance, &pipeline.state, findings);
+    }
+}
+
+/// Placements name fields.
+fn check_places(layout: &Layout, pipeline: &Pipeline, findings: &mut Findings) {
+    for placed in layout.place.iter().flat_map(|row| &row.parts).flat_map(fields) {
+        let found = placed.field.as_deref().map(|name| find_field(name, placed.span, pipeline));
+        if let Some(Err(diagnostic)) = found {
+            findings.push(diagnostic);
+        }
+    }
+}
+
+fn fields(part: &Placed) -> &[PlacedField] {
+    match part {
+        Placed::Words(field) => std::slice::from_ref(field),
+        Placed::Bits(fields) => fields,
+    }
+}
+
+/// `instance.field`, or `instance.field.member` of a hit.
+fn find_field(name: &str, span: Span, pipeline: &Pipeline) -> Result<(), Diagnostic> {
+    let mut parts = name.splitn(3, '.');
+    let instance = parts.next().unwrap_or_default();
+    let Some(record) = pipeline.state.get(instance) else {
+        let instances = pipeline.state.keys().map(String::as_str);
+        return Err(Diagnostic::error("K0404", format!("there is no instance `{instance}`"))
+            .at(span, format!("the pipeline `{}` has no such instance", pipeline.name))
+            .help(suggest::help(instance, "instances", instances)));
+    };
+    let Some(fields) = pipeline.records.get(&record.value).map(|record| &record.fields) else {
+        return Ok(());
+    };
+    let names = || fields.keys().map(String::as_str);
+    let Some(field) = parts.next() else {
+        return Err(Diagnostic::error("K0404", format!("`{instance}` is an instance, not a field"))
+            .at(span, "names no field")
+            .help(format!("write `{instance}.` and one of {}", suggest::quoted(names()))));
+    };
+    let Some(found) = fields.get(field) else {
+        return Err(Diagnostic::error("K0404", format!("`{instance}` has no field `{field}`"))
+            .at(span, "no such field")
+            .also(record.span, format!("`{instance}` is a {}", record.value))
+            .help(suggest::help(field, "fields", names())));
+    };
+    match parts.next() {
+        Some(member) => find_member(member, Spanned { value: name, span }, found),
+        None => Ok(()),
+    }
+}
+
+fn find_member(member: &str, placed: Spanned<&str>, field: &Field) -> Result<(), Diagnostic> {
+    let leaves = field.quantity.leaves();
+    let members: Vec<&str> = leaves.iter().filter_map(|leaf| leaf.member).collect();
+    if members.contains(&member) {
+        return Ok(());
+    }
+    let quantity = field.quantity.name();
+    let whole = placed.value.strip_suffix(member).unwrap_or(placed.value).trim_end_matches('.');
+    let help = if members.is_empty() {
+        format!("a {quantity} is placed as a whole: `{whole}`")
+    } else {
+        suggest::help(member, "members", members)
+    };
+    Err(Diagnostic::error("K0404", format!("`{whole}` has no part `{member}`"))
+        .at(placed.span, "no such part")
+        .also(field.span, format!("its quantity is {quantity}"))
+        .help(help))
+}
+
+/// Whether the name stands in for one that is not written; that has been reported.
+fn is_missing(name: &Spanned<String>) -> bool {
+    name.span.start == name.span.end
+}
+
+/// A name that must be among the declared ones.
+fn check_known<T>(
+    (code, noun): (&'static str, &str),
+    name: &Spanned<String>,
+    declared: &IndexMap<String, T>,
+    findings: &mut Findings,
+) {
+    if !declared.contains_key(&name.value) && !is_missing(name) {
+        let unknown = Diagnostic::error(code, format!("there is no {noun} `{}`", name.value))
+            .at(name.span, format!("no such {noun}"))
+            .help(suggest::help(&name.value, &format!("{noun}s"), declared.keys().map(String::as_str)));
+        findings.push(unknown);
+    }
+}

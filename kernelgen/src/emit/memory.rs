@@ -1,0 +1,354 @@
+//! State tables in WGSL: their variables and addresses, and the loads and stores of a kernel.
+
+use super::text::COMPONENTS;
+use crate::analyze::{KernelTraffic, Leaf};
+use crate::config::model::Order;
+use crate::config::quantity::LeafType;
+use crate::layout::{Placement, Slot, StateLeaf, Table};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+/// The WGSL name of a table's buffer.
+pub(super) fn buffer_name(table: &Table) -> String {
+    if table.name == "state" { "state".to_owned() } else { format!("{}_state", table.name) }
+}
+
+/// `package::tables`: the buffers of the path state and where in them a path's record is.
+pub(super) fn module(placement: &Placement) -> String {
+    let mut text = String::from("import package::pass::{path_count, path_id};\n");
+    for table in placement.tables.iter().filter(|table| table.lanes > 0) {
+        let name = buffer_name(table);
+        let words = table.lanes * table.lane;
+        let _ = write!(
+            text,
+            "\n/// State of {}: {words} words a path, {}.\n\
+             var<storage, read_write> {name}: array<{}>;\n\n\
+             /// Where a lane of this path's record is.\n\
+             fn {name}_address(lane: u32) -> u32 {{\n    return {};\n}}\n",
+            table.instances.join(", "),
+            describe(table.order),
+            lane_type(table.lane),
+            address(table),
+        );
+    }
+    text
+}
+
+fn describe(order: Order) -> String {
+    match order {
+        Order::Aos => "one record after the other".to_owned(),
+        Order::Soa => "a plane a lane".to_owned(),
+        Order::Aosoa(block) => format!("a plane a lane in blocks of {block} paths"),
+    }
+}
+
+fn lane_type(lane: u32) -> String {
+    if lane == 1 { "u32".to_owned() } else { format!("vec{lane}<u32>") }
+}
+
+/// The text of `Table::address`.
+fn address(table: &Table) -> String {
+    match table.order {
+        Order::Aos => format!("path_id * {}u + lane", table.lanes),
+        Order::Soa => "lane * path_count + path_id".to_owned(),
+        Order::Aosoa(block) => format!(
+            "path_id / {block}u * {}u + lane * {block}u + path_id % {block}u",
+            table.lanes * block
+        ),
+    }
+}
+
+/// The loads and stores of one kernel.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Access {
+    /// Statements that fill the instances.
+    pub loads: Vec<String>,
+    /// Statements that write them back.
+    pub stores: Vec<String>,
+    /// Bytes that the loads move.
+    pub load_bytes: u32,
+    /// Bytes that the stores move.
+    pub store_bytes: u32,
+    /// Buffers used: names of tables' variables.
+    pub buffers: BTreeSet<String>,
+}
+
+/// The statements that move a kernel's leaves between tables and instances.
+pub(super) fn access(
+    placement: &Placement,
+    leaves: &BTreeMap<Leaf, StateLeaf>,
+    traffic: &KernelTraffic,
+) -> Access {
+    let memory = Memory { placement, leaves, traffic, words: words(placement) };
+    let mut access = Access::default();
+    let loaded = memory.load_lanes(&mut access);
+    memory.fill_leaves(&loaded, &mut access);
+    memory.store_lanes(&loaded, &mut access);
+    access
+}
+
+/// A word of a record: index of the table, index of the word.
+type Word = (usize, u32);
+/// A lane of a record: index of the table, index of the lane.
+type Lane = (usize, u32);
+
+/// A leaf's part of a word.
+struct Part<'a> {
+    leaf: &'a Leaf,
+    slot: &'a Slot,
+    component: usize,
+}
+
+fn words(placement: &Placement) -> BTreeMap<Word, Vec<Part<'_>>> {
+    let mut words: BTreeMap<Word, Vec<Part<'_>>> = BTreeMap::new();
+    for (leaf, slot) in &placement.slots {
+        for (component, &word) in slot.words.iter().enumerate() {
+            words.entry((slot.table, word)).or_default().push(Part { leaf, slot, component });
+        }
+    }
+    for parts in words.values_mut() {
+        parts.sort_by_key(|part| part.slot.shift);
+    }
+    words
+}
+
+struct Memory<'a> {
+    placement: &'a Placement,
+    leaves: &'a BTreeMap<Leaf, StateLeaf>,
+    traffic: &'a KernelTraffic,
+    words: BTreeMap<Word, Vec<Part<'a>>>,
+}
+
+/// Lanes read as a whole, and the names of words in registers.
+#[derive(Default)]
+struct Loaded {
+    whole: BTreeMap<Lane, String>,
+    words: BTreeMap<Word, String>,
+}
+
+/// What a kernel must do to a word.
+enum WordStore {
+    /// Nothing in it is live afterwards: any value will do.
+    Free,
+    /// It must stay as it is.
+    Keep,
+    /// It gets this value.
+    Value(String),
+}
+
+impl Memory<'_> {
+    fn table(&self, table: usize) -> &Table {
+        &self.placement.tables[table]
+    }
+
+    /// The lane of a word and its component there.
+    fn lane_of(&self, (table, word): Word) -> (Lane, usize) {
+        let lane = self.table(table).lane;
+        ((table, word / lane), (word % lane) as usize)
+    }
+
+    /// Words that the kernel needs in registers: of loaded leaves, and those it stores a part of while the rest stays live.
+    fn needed_words(&self) -> BTreeSet<Word> {
+        let needs = |parts: &Vec<Part<'_>>| {
+            let loaded = parts.iter().any(|part| self.traffic.loads.contains(part.leaf));
+            loaded || (self.stores_any(parts) && self.keeps_any(parts))
+        };
+        self.words.iter().filter(|(_, parts)| needs(parts)).map(|(word, _)| *word).collect()
+    }
+
+    fn stores_any(&self, parts: &[Part<'_>]) -> bool {
+        parts.iter().any(|part| self.traffic.stores.contains(part.leaf))
+    }
+
+    /// Whether a leaf that the kernel does not store lives on in this word.
+    fn keeps_any(&self, parts: &[Part<'_>]) -> bool {
+        let keeps = |leaf| self.traffic.live_out.contains(leaf) && !self.traffic.stores.contains(leaf);
+        parts.iter().any(|part| keeps(part.leaf))
+    }
+
+    fn load_lanes(&self, access: &mut Access) -> Loaded {
+        let mut lanes: BTreeMap<Lane, Vec<(Word, usize)>> = BTreeMap::new();
+        for word in self.needed_words() {
+            let (lane, component) = self.lane_of(word);
+            lanes.entry(lane).or_default().push((word, component));
+        }
+        let mut loaded = Loaded::default();
+        for (lane, needed) in lanes {
+            let table = self.table(lane.0);
+            let buffer = buffer_name(table);
+            let source = format!("{buffer}[{buffer}_address({}u)]", lane.1);
+            let local = format!("{buffer}_{}", lane.1);
+            match needed.as_slice() {
+                [(word, component)] if table.lane > 1 => {
+                    let component = COMPONENTS[*component];
+                    access.loads.push(format!("let {local}_{component} = {source}.{component};"));
+                    access.load_bytes += 4;
+                    loaded.words.insert(*word, format!("{local}_{component}"));
+                }
+                _ => {
+                    access.loads.push(format!("let {local} = {source};"));
+                    access.load_bytes += 4 * table.lane;
+                    for (word, component) in needed {
+                        let name = match table.lane {
+                            1 => local.clone(),
+                            _ => format!("{local}.{}", COMPONENTS[component]),
+                        };
+                        loaded.words.insert(word, name);
+                    }
+                    loaded.whole.insert(lane, local);
+                }
+            }
+            access.buffers.insert(buffer);
+        }
+        loaded
+    }
+
+    fn fill_leaves(&self, loaded: &Loaded, access: &mut Access) {
+        for leaf in &self.traffic.loads {
+            let (Some(slot), Some(declared)) = (self.placement.slots.get(leaf), self.leaves.get(leaf))
+            else {
+                continue;
+            };
+            let bits = self.register(slot, loaded);
+            let value = match declared.ty {
+                LeafType::U32 if slot.bits < 32 => {
+                    format!("extractBits({bits}, {}u, {}u)", slot.shift, slot.bits)
+                }
+                LeafType::U32 => bits,
+                LeafType::Real => format!("bitcast<real>({bits})"),
+                LeafType::Vec2 => format!("bitcast<vec2r>({bits})"),
+                LeafType::Vec3 => format!("bitcast<vec3r>({bits})"),
+            };
+            access.loads.push(format!("{leaf} = {value};"));
+        }
+    }
+
+    /// The words of a slot as one value: a swizzle where they stand side by side in one lane.
+    fn register(&self, slot: &Slot, loaded: &Loaded) -> String {
+        let lanes: Vec<(Lane, usize)> =
+            slot.words.iter().map(|&word| self.lane_of((slot.table, word))).collect();
+        let (lane, first) = lanes[0];
+        let together =
+            lanes.iter().enumerate().all(|(step, place)| *place == (lane, first + step));
+        match loaded.whole.get(&lane) {
+            Some(local) if together && lanes.len() > 1 => {
+                let all = lanes.len() as u32 == self.table(slot.table).lane;
+                let swizzle = COMPONENTS[first..first + lanes.len()].concat();
+                if all { local.clone() } else { format!("{local}.{swizzle}") }
+            }
+            _ => {
+                let names: Vec<&str> = slot
+                    .words
+                    .iter()
+                    .map(|&word| loaded.words.get(&(slot.table, word)).map_or("", String::as_str))
+                    .collect();
+                match names.as_slice() {
+                    [name] => (*name).to_owned(),
+                    _ => format!("vec{}u({})", names.len(), names.join(", ")),
+                }
+            }
+        }
+    }
+
+    fn store_lanes(&self, loaded: &Loaded, access: &mut Access) {
+        let lanes: BTreeSet<Lane> = self
+            .words
+            .iter()
+            .filter(|(_, parts)| self.stores_any(parts))
+            .map(|(word, _)| self.lane_of(*word).0)
+            .collect();
+        for lane in lanes {
+            self.store_lane(lane, loaded, access);
+        }
+    }
+
+    /// Stores a lane as a whole if nothing in it must stay and at least half of it is new, else word by word.
+    fn store_lane(&self, lane: Lane, loaded: &Loaded, access: &mut Access) {
+        let table = self.table(lane.0);
+        let buffer = buffer_name(table);
+        let target = format!("{buffer}[{buffer}_address({}u)]", lane.1);
+        access.buffers.insert(buffer);
+        let first = lane.1 * table.lane;
+        let stores: Vec<WordStore> = (first..first + table.lane)
+            .map(|word| self.word_store((lane.0, word), loaded))
+            .collect();
+        let values = stores.iter().filter(|store| matches!(store, WordStore::Value(_))).count();
+        let whole = !stores.iter().any(|store| matches!(store, WordStore::Keep))
+            && 2 * values >= stores.len();
+        if whole {
+            let value = self.lane_value(lane, &stores);
+            access.stores.push(format!("{target} = {value};"));
+            access.store_bytes += 4 * table.lane;
+            return;
+        }
+        for (store, component) in stores.iter().zip(COMPONENTS) {
+            if let WordStore::Value(value) = store {
+                access.stores.push(format!("{target}.{component} = {value};"));
+                access.store_bytes += 4;
+            }
+        }
+    }
+
+    fn word_store(&self, word: Word, loaded: &Loaded) -> WordStore {
+        let Some(parts) = self.words.get(&word) else { return WordStore::Free };
+        let keeps = self.keeps_any(parts);
+        if !self.stores_any(parts) {
+            return if keeps { WordStore::Keep } else { WordStore::Free };
+        }
+        let old = if keeps { loaded.words.get(&word).map_or("0u", String::as_str) } else { "0u" };
+        let mut value = old.to_owned();
+        for part in parts.iter().filter(|part| self.traffic.stores.contains(part.leaf)) {
+            let bits = self.bits_of(part);
+            value = if part.slot.bits == 32 {
+                bits
+            } else {
+                format!("insertBits({value}, {bits}, {}u, {}u)", part.slot.shift, part.slot.bits)
+            };
+        }
+        WordStore::Value(value)
+    }
+
+    /// A component of a leaf as a word.
+    fn bits_of(&self, part: &Part<'_>) -> String {
+        let leaf = part.leaf;
+        match self.leaves.get(leaf).map(|declared| declared.ty) {
+            Some(LeafType::Real) => format!("bitcast<u32>({leaf})"),
+            Some(LeafType::Vec2 | LeafType::Vec3) => {
+                format!("bitcast<u32>({leaf}.{})", COMPONENTS[part.component])
+            }
+            _ => leaf.to_string(),
+        }
+    }
+
+    /// The words of a lane as one value; a vector that stands side by side is written as one.
+    fn lane_value(&self, lane: Lane, stores: &[WordStore]) -> String {
+        let first = lane.1 * stores.len() as u32;
+        let mut values = Vec::new();
+        let mut at = 0;
+        while at < stores.len() {
+            let word = (lane.0, first + at as u32);
+            let (value, words) = match (self.whole_vector(word, stores.len() - at), &stores[at]) {
+                (Some((leaf, words)), WordStore::Value(_)) => {
+                    (format!("bitcast<vec{words}u>({leaf})"), words)
+                }
+                (_, WordStore::Value(value)) => (value.clone(), 1),
+                _ => ("0u".to_owned(), 1),
+            };
+            values.push(value);
+            at += words;
+        }
+        match values.as_slice() {
+            [value] => value.clone(),
+            _ => format!("vec{}u({})", stores.len(), values.join(", ")),
+        }
+    }
+
+    /// The vector leaf whose words are this one and those right behind it, at most `room`.
+    fn whole_vector(&self, word: Word, room: usize) -> Option<(&Leaf, usize)> {
+        let [part] = self.words.get(&word)?.as_slice() else { return None };
+        let words = &part.slot.words;
+        let together = words.iter().zip(word.1..).all(|(&own, expected)| own == expected);
+        let fits = part.component == 0 && words.len() > 1 && words.len() <= room;
+        (fits && together).then_some((part.leaf, words.len()))
+    }
+}

@@ -1,0 +1,234 @@
+//! The generator's last step: modules and kernels as text, the plan, the report.
+
+mod entry;
+mod film;
+mod kernel;
+mod memory;
+mod modules;
+mod program;
+mod queue;
+mod signature;
+mod stream;
+#[cfg(test)]
+mod tests;
+mod text;
+mod wiring;
+
+use crate::analyze::{self, Leaf, Liveness};
+use crate::config::evaluate_rounds;
+use crate::config::model::{Selection, Variant};
+use crate::config;
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::layout::{self, Placement, StateLeaf};
+use crate::link::Modules;
+use crate::plan::Plan;
+use crate::report::{self, Report};
+use crate::source::{FileKind, Sources};
+use indexmap::IndexSet;
+use program::Program;
+use queue::Queues;
+use std::collections::BTreeMap;
+use wiring::{Texts, Wiring};
+
+/// What is generated from a selection.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    /// The resolved variant.
+    pub variant: Variant,
+    /// Kernels, buffers, program.
+    pub plan: Plan,
+    /// What lives where and why.
+    pub report: Report,
+    /// Findings that did not stop the generator.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// Generates everything; generated modules are added to `sources` under `<generated>/`.
+///
+/// # Errors
+/// The findings of the first phase that fails: configs, wiring and stage texts, initialisation (K0210), layout, kernels.
+pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, Vec<Diagnostic>> {
+    let (variant, mut warnings) = config::load(sources, selection)?;
+    check_names(&variant)?;
+    let rounds = evaluate_rounds(&variant.pipeline).map_err(|finding| vec![finding])?;
+    let constants = modules::constants(&variant.pipeline, &variant.effects);
+    let mut modules = modules_of(sources);
+    let outcomes = add_config_modules(sources, &mut modules, &variant)?;
+    let wiring = {
+        let texts =
+            Texts { sources, modules: &modules, constants: &constants, outcomes: &outcomes };
+        wiring::wire(texts, &variant)?
+    };
+    warnings.extend(wiring.warnings.iter().cloned());
+    let start = &variant.pipeline.start.value;
+    let liveness = analyze::liveness(&wiring.flow(start));
+    check_initialised(&wiring, &liveness, start)?;
+    let placement = layout::assign(&variant, &liveness)?;
+    let queues = queues(&wiring, &variant);
+    add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues);
+    let leaves = leaves(&variant);
+    let program = Program {
+        variant: &variant,
+        wiring: &wiring,
+        liveness: &liveness,
+        placement: &placement,
+        leaves: &leaves,
+        queues: &queues,
+        constants: &constants,
+        rounds,
+    };
+    let built = program::build(sources, &mut modules, &program)?;
+    let facts = wiring.stages.iter().map(|(name, stage)| (name.as_str(), &stage.facts));
+    let mut effects_seen = built.effects_seen;
+    effects_seen.extend(wiring.effects_seen.iter().cloned());
+    let report = report::build(&report::Findings {
+        sources,
+        variant: &variant,
+        plan: &built.plan,
+        placement: &placement,
+        liveness: &liveness,
+        stages: facts.collect(),
+        effects_seen: &effects_seen,
+    });
+    debug_assert!(warnings.iter().all(|warning| warning.severity == Severity::Warning));
+    Ok(Parts { variant, plan: built.plan, report, warnings })
+}
+
+/// All WGSL modules by module path.
+fn modules_of(sources: &Sources) -> Modules {
+    let path = |key: &str| key.replace('/', "::");
+    sources.of_kind(FileKind::Module).map(|(id, file)| (path(&file.key), id)).collect()
+}
+
+fn add_module(sources: &mut Sources, modules: &mut Modules, name: &str, text: String) {
+    let file = sources.add(FileKind::Module, name, format!("<generated>/{name}.wgsl"), text);
+    modules.insert(name.to_owned(), file);
+}
+
+/// Adds the modules that stages import, and returns the outcomes in order of their values.
+fn add_config_modules(
+    sources: &mut Sources,
+    modules: &mut Modules,
+    variant: &Variant,
+) -> Result<IndexSet<String>, Vec<Diagnostic>> {
+    let pipeline = &variant.pipeline;
+    let outcomes = modules::outcome_names(pipeline, &imported_outcomes(sources, modules, variant));
+    let state = modules::state(pipeline)?;
+    // Stages are analysed against counters and queues of no stage: which there are follows from the analysis.
+    let queues = Queues { workgroup: variant.schedule.workgroup.value, ..Queues::default() };
+    let kind = variant.schedule.queue;
+    let texts = [
+        ("real", modules::real(variant.precision.real)),
+        ("state", state),
+        ("outcome", modules::outcome(&outcomes)),
+        ("features", modules::features(&variant.effects)),
+        ("params", modules::params(&pipeline.params)),
+        ("pass", modules::PASS.to_owned()),
+        ("control", queue::control_module(&queues, kind)),
+        ("film", film::module(variant.schedule.accumulate)),
+        ("streams", stream::analysis_module(pipeline)),
+    ];
+    for (name, text) in texts {
+        add_module(sources, modules, name, text);
+    }
+    Ok(outcomes)
+}
+
+/// Outcomes that the pipeline's own stage functions import.
+fn imported_outcomes(sources: &Sources, modules: &Modules, variant: &Variant) -> Vec<String> {
+    let entries = entry::Entries::scan(sources, modules);
+    let mut names = Vec::new();
+    for stage in variant.pipeline.stages.values() {
+        let Ok(entry) = entries.find(&stage.entry) else { continue };
+        if let Some(file) = modules.get(&entry.module) {
+            names.extend(entry::imported_outcomes(&sources.file(*file).text));
+        }
+    }
+    names
+}
+
+/// Adds the modules that follow from the analysis.
+fn add_state_modules(
+    sources: &mut Sources,
+    modules: &mut Modules,
+    variant: &Variant,
+    wiring: &Wiring,
+    placement: &Placement,
+    queues: &Queues,
+) {
+    let kind = variant.schedule.queue;
+    let texts = [
+        ("control", queue::control_module(queues, kind)),
+        ("queue", queue::queue_module(queues, kind)),
+        ("tables", memory::module(placement)),
+        ("streams", stream::module(&variant.pipeline, wiring)),
+    ];
+    for (name, text) in texts {
+        add_module(sources, modules, name, text);
+    }
+}
+
+fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
+    let batched = wiring.streams.iter().filter(|(_, stream)| stream.batched);
+    Queues {
+        stages: wiring.stages.keys().filter(|stage| wiring.is_looped(stage)).cloned().collect(),
+        streams: batched.map(|(name, _)| name.clone()).collect(),
+        workgroup: variant.schedule.workgroup.value,
+    }
+}
+
+fn leaves(variant: &Variant) -> BTreeMap<Leaf, StateLeaf> {
+    let leaves = layout::state_leaves(&variant.pipeline).into_iter();
+    leaves.map(|leaf| (leaf.leaf.clone(), leaf)).collect()
+}
+
+/// K0210: a leaf that some stage reads although no stage before it surely wrote it.
+fn check_initialised(
+    wiring: &Wiring,
+    liveness: &Liveness,
+    start: &str,
+) -> Result<(), Vec<Diagnostic>> {
+    let Some(traffic) = liveness.kernels.get(start) else { return Ok(()) };
+    let findings: Vec<Diagnostic> =
+        traffic.live_in.iter().map(|leaf| uninitialised(wiring, leaf, start)).collect();
+    if findings.is_empty() { Ok(()) } else { Err(findings) }
+}
+
+fn uninitialised(wiring: &Wiring, leaf: &Leaf, start: &str) -> Diagnostic {
+    let mut finding =
+        Diagnostic::error("K0210", format!("`{leaf}` can be read before it was ever written"));
+    let mut reading = wiring.stages.iter().filter_map(|(name, stage)| {
+        let place = stage.facts.reads.get(leaf)?;
+        Some((name, *place))
+    });
+    if let Some((name, place)) = reading.next() {
+        finding = finding.at(place, format!("stage `{name}` reads it here"));
+    }
+    if let Some(entry) = wiring.stages.get(start).map(|stage| &stage.entry) {
+        let message = format!("paths begin in stage `{start}`, which does not surely write it");
+        finding = finding.also(entry.span, message);
+    }
+    for (name, stage) in &wiring.stages {
+        if let Some(place) = stage.facts.maybe.get(leaf) {
+            finding = finding.also(*place, format!("stage `{name}` writes it on some ways only"));
+        }
+    }
+    finding.help(format!("write it in `{start}`, or on every way that leads to where it is read"))
+}
+
+/// K0214: names that generated text uses itself.
+fn check_names(variant: &Variant) -> Result<(), Vec<Diagnostic>> {
+    let pipeline = &variant.pipeline;
+    let reserved = kernel::reserved_locals();
+    let instances = pipeline.state.iter().map(|(name, record)| (name, record.span));
+    let streams = pipeline.streams.iter().map(|(name, stream)| (name, stream.span));
+    let taken = instances.chain(streams).filter(|(name, _)| reserved.contains(name.as_str()));
+    let findings: Vec<Diagnostic> = taken
+        .map(|(name, span)| {
+            Diagnostic::error("K0214", format!("`{name}` is a name that generated kernels use"))
+                .at(span, "declared here")
+                .help("choose another name")
+        })
+        .collect();
+    if findings.is_empty() { Ok(()) } else { Err(findings) }
+}

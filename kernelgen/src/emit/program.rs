@@ -1,0 +1,332 @@
+//! From kernel texts to the plan: linking, validation, buffers, the order of steps.
+
+use super::kernel::{self, Source};
+use super::memory::{self, Access};
+use super::queue::{self, Prepared, Queues};
+use super::stream;
+use super::wiring::Wiring;
+use crate::analyze::{self, Leaf, Liveness};
+use crate::config::model::{Accumulate, QueueKind, RayKind, Variant};
+use crate::diagnostic::Diagnostic;
+use crate::layout::{Placement, StateLeaf};
+use crate::link::{self, Constants, LinkedBinding, Modules, Root};
+use crate::plan::{Binding, Buffer, Counter, Kernel, Needs, Plan, Role, Size, Step};
+use crate::source::{FileKind, Sources};
+use indexmap::IndexMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the program is built from.
+pub(super) struct Program<'a> {
+    pub variant: &'a Variant,
+    pub wiring: &'a Wiring,
+    pub liveness: &'a Liveness,
+    pub placement: &'a Placement,
+    pub leaves: &'a BTreeMap<Leaf, StateLeaf>,
+    pub queues: &'a Queues,
+    pub constants: &'a Constants,
+    pub rounds: u32,
+}
+
+/// A plan and the effects that its kernels ask for.
+pub(super) struct Built {
+    pub plan: Plan,
+    pub effects_seen: BTreeSet<String>,
+}
+
+/// Generates all kernels and the plan.
+///
+/// # Errors
+/// Whatever the linker and naga find in a kernel; K0214 two kernels of one name.
+pub(super) fn build(
+    sources: &mut Sources,
+    modules: &mut Modules,
+    program: &Program<'_>,
+) -> Result<Built, Vec<Diagnostic>> {
+    let mut builder = Builder {
+        sources,
+        modules,
+        program,
+        kernels: Vec::new(),
+        effects_seen: BTreeSet::new(),
+        findings: Vec::new(),
+    };
+    let steps = builder.steps();
+    if builder.findings.is_empty() { Ok(builder.finish(steps)) } else { Err(builder.findings) }
+}
+
+struct Builder<'a> {
+    sources: &'a mut Sources,
+    modules: &'a mut Modules,
+    program: &'a Program<'a>,
+    kernels: Vec<(Kernel, Vec<LinkedBinding>)>,
+    effects_seen: BTreeSet<String>,
+    findings: Vec<Diagnostic>,
+}
+
+/// A kernel before it is linked.
+#[derive(Default)]
+struct Draft {
+    name: String,
+    text: String,
+    workgroup: u32,
+    stages: Vec<String>,
+    load_bytes: u32,
+    store_bytes: u32,
+    rays: Option<RayKind>,
+}
+
+impl Builder<'_> {
+    fn steps(&mut self) -> Vec<Step> {
+        let program = self.program;
+        let start = program.variant.pipeline.start.value.as_str();
+        let start_rays = program.wiring.stages.get(start).and_then(|stage| stage.rays);
+        let begin = self.housekeeping("begin", queue::begin_kernel(start_rays), 64);
+        let first = self.stage(start, Source::Slots);
+        let body = self.round();
+        let finish = self.housekeeping("finish", queue::finish_kernel(program.queues), 1);
+        vec![
+            Step::Single { kernel: begin },
+            Step::Dispatch { kernel: first },
+            Step::Loop { rounds: program.rounds, body },
+            Step::Single { kernel: finish },
+        ]
+    }
+
+    /// The steps of a round: stages in groups behind one prepare kernel each, then the consumers of streams.
+    fn round(&mut self) -> Vec<Step> {
+        let queues = self.program.queues;
+        let mut body = Vec::new();
+        for group in self.groups() {
+            let prepared: Vec<Prepared> = group.iter().map(|stage| self.prepared_stage(stage)).collect();
+            let name = format!("prepare_{}", group[0]);
+            self.prepare(&name, &prepared, &mut body);
+            for stage in group {
+                let kernel = self.stage(&stage, Source::Queue);
+                body.push(Step::Indirect { kernel, slot: queues.of_stage(&stage).unwrap_or_default() });
+            }
+        }
+        if let Some(first) = queues.streams.first() {
+            let prepared: Vec<Prepared> =
+                queues.streams.iter().map(|stream| self.prepared_stream(stream)).collect();
+            self.prepare(&format!("prepare_{first}_stream"), &prepared, &mut body);
+        }
+        for stream in &queues.streams {
+            let kernel = self.consumer(stream);
+            body.push(Step::Indirect { kernel, slot: queues.of_stream(stream).unwrap_or_default() });
+        }
+        body
+    }
+
+    /// Consecutive stages of which none feeds a later one: their queues are complete when the first of them runs.
+    fn groups(&self) -> Vec<Vec<String>> {
+        let feeds = |from: &String, to: &String| {
+            let routes = &self.program.wiring.stages[from].routes;
+            routes.iter().any(|(_, target)| target == to)
+        };
+        let mut groups: Vec<Vec<String>> = Vec::new();
+        for stage in &self.program.queues.stages {
+            match groups.last_mut() {
+                Some(group) if !group.iter().any(|earlier| feeds(earlier, stage)) => {
+                    group.push(stage.clone());
+                }
+                _ => groups.push(vec![stage.clone()]),
+            }
+        }
+        groups
+    }
+
+    fn prepared_stage(&self, stage: &str) -> Prepared {
+        let rays = self.program.wiring.stages[stage].rays;
+        Prepared { constant: queue::stage_constant(stage), capacity: 1, rays }
+    }
+
+    fn prepared_stream(&self, name: &str) -> Prepared {
+        let stream = &self.program.wiring.streams[name];
+        Prepared {
+            constant: queue::stream_constant(name),
+            capacity: stream.capacity,
+            rays: stream.rays,
+        }
+    }
+
+    /// Adds a prepare kernel; the first of a round counts the round.
+    fn prepare(&mut self, name: &str, prepared: &[Prepared], body: &mut Vec<Step>) {
+        let text = queue::prepare_kernel(name, body.is_empty(), prepared);
+        let kernel = self.housekeeping(name, text, 1);
+        body.push(Step::Single { kernel });
+    }
+
+    fn housekeeping(&mut self, name: &str, text: String, workgroup: u32) -> usize {
+        self.compile(Draft { name: name.to_owned(), text, workgroup, ..Draft::default() })
+    }
+
+    fn stage(&mut self, name: &str, source: Source) -> usize {
+        let program = self.program;
+        let stage = &program.wiring.stages[name];
+        let access = match program.liveness.kernels.get(name) {
+            Some(traffic) => memory::access(program.placement, program.leaves, traffic),
+            None => Access::default(),
+        };
+        let starts_again = source == Source::Slots && program.wiring.is_looped(name);
+        let kernel = if starts_again { format!("{name}_first") } else { name.to_owned() };
+        let workgroup = program.variant.schedule.workgroup.value;
+        self.compile(Draft {
+            text: kernel::stage_kernel(&kernel, name, stage, source, workgroup, &access),
+            name: kernel,
+            workgroup,
+            stages: vec![name.to_owned()],
+            load_bytes: access.load_bytes,
+            store_bytes: access.store_bytes,
+            rays: stage.rays,
+        })
+    }
+
+    fn consumer(&mut self, name: &str) -> usize {
+        let stream = &self.program.wiring.streams[name];
+        let kernel = format!("{}_{name}", stream.entry.name);
+        let workgroup = self.program.variant.schedule.workgroup.value;
+        self.compile(Draft {
+            text: kernel::consumer_kernel(&kernel, name, stream, workgroup),
+            name: kernel,
+            workgroup,
+            rays: stream.rays,
+            ..Draft::default()
+        })
+    }
+
+    /// Links and validates a kernel and returns its index.
+    fn compile(&mut self, draft: Draft) -> usize {
+        match self.link(&draft) {
+            Ok(linked) => self.kernels.push(linked),
+            Err(findings) => {
+                let new: Vec<Diagnostic> =
+                    findings.into_iter().filter(|finding| !self.findings.contains(finding)).collect();
+                self.findings.extend(new);
+            }
+        }
+        self.kernels.len().saturating_sub(1)
+    }
+
+    fn link(&mut self, draft: &Draft) -> Result<(Kernel, Vec<LinkedBinding>), Vec<Diagnostic>> {
+        let name = &draft.name;
+        if self.kernels.iter().any(|(kernel, _)| kernel.name == *name) {
+            let message = format!("two kernels would be named `{name}`");
+            let start = self.program.variant.pipeline.start.span;
+            return Err(vec![
+                Diagnostic::error("K0214", message)
+                    .at(start, "in this pipeline")
+                    .help(format!("rename the stage; `{name}` is a generated kernel")),
+            ]);
+        }
+        let module = format!("kernel::{name}");
+        let entry = format!("{name}_main");
+        let file = self.sources.add(
+            FileKind::Module,
+            format!("kernel/{name}"),
+            format!("<generated>/kernel/{name}.wgsl"),
+            draft.text.as_str(),
+        );
+        self.modules.insert(module.clone(), file);
+        let root = Root { module: &module, item: &entry };
+        let linked = link::link(self.sources, self.modules, self.program.constants, root)?;
+        let parsed = analyze::parse(&linked)?;
+        analyze::validate(&parsed, &linked)?;
+        self.effects_seen.extend(linked.constants_seen);
+        let uses_path_count = linked.items.iter().any(|(_, item)| item == "path_count");
+        let kernel = Kernel {
+            name: name.clone(),
+            entry,
+            module: linked.text,
+            uses_path_count,
+            bindings: Vec::new(),
+            workgroup: draft.workgroup,
+            stages: draft.stages.clone(),
+            load_bytes: draft.load_bytes,
+            store_bytes: draft.store_bytes,
+            rays: draft.rays,
+        };
+        Ok((kernel, linked.bindings))
+    }
+
+    fn finish(self, program: Vec<Step>) -> Built {
+        let buffers = self.buffers();
+        let needs = self.needs();
+        let placement = self.program.placement;
+        let kernels = self.kernels.into_iter().map(|(kernel, bindings)| {
+            let binding = |binding: LinkedBinding| {
+                let buffer = buffers.get_index_of(&binding.name)?;
+                Some(Binding { binding: binding.binding, buffer, access: binding.access })
+            };
+            Kernel { bindings: bindings.into_iter().filter_map(binding).collect(), ..kernel }
+        });
+        let counters = queue::counters().map(|(name, word)| Counter { name: name.to_owned(), word });
+        let plan = Plan {
+            kernels: kernels.collect(),
+            program,
+            counters: counters.collect(),
+            film: self.program.variant.schedule.accumulate,
+            bytes_per_path: placement.bytes_per_path(),
+            needs,
+            buffers: buffers.into_values().collect(),
+        };
+        Built { plan, effects_seen: self.effects_seen }
+    }
+
+    /// Generated buffers that a kernel uses (film, pass and control always), then scene resources in order of first use.
+    fn buffers(&self) -> IndexMap<String, Buffer> {
+        let used: Vec<&str> =
+            self.kernels.iter().flat_map(|(_, bindings)| bindings).map(|binding| binding.name.as_str()).collect();
+        let always = [Role::Film, Role::Pass, Role::Control];
+        let mut buffers: IndexMap<String, Buffer> = self
+            .generated_buffers()
+            .into_iter()
+            .filter(|buffer| always.contains(&buffer.role) || used.contains(&buffer.name.as_str()))
+            .map(|buffer| (buffer.name.clone(), buffer))
+            .collect();
+        for name in used {
+            let resource =
+                || Buffer { name: name.to_owned(), role: Role::Resource, size: Size::default() };
+            buffers.entry(name.to_owned()).or_insert_with(resource);
+        }
+        buffers
+    }
+
+    fn generated_buffers(&self) -> Vec<Buffer> {
+        let program = self.program;
+        let buffer = |name: &str, role, size| Buffer { name: name.to_owned(), role, size };
+        let per_path = |bytes: u32| Size { per_path: u64::from(bytes), ..Size::default() };
+        let fixed = |bytes: u32| Size { fixed: u64::from(bytes), ..Size::default() };
+        let tables = program.placement.tables.iter();
+        let mut buffers: Vec<Buffer> = tables
+            .map(|table| buffer(&memory::buffer_name(table), Role::State, per_path(table.bytes_per_path())))
+            .collect();
+        let channel = if program.variant.schedule.accumulate == Accumulate::FixedI64 { 8 } else { 4 };
+        let film = Size { per_pixel: 3 * channel, ..Size::default() };
+        buffers.extend([
+            buffer("queue", Role::Queue, per_path(4 * program.queues.stages.len() as u32)),
+            buffer("control", Role::Control, fixed(4 * program.queues.control_words())),
+            buffer("arguments", Role::Arguments, fixed(12 * program.queues.count().max(1))),
+        ]);
+        let streams = program.wiring.streams.iter().filter(|(_, stream)| stream.batched);
+        buffers.extend(streams.map(|(name, stream)| {
+            let bytes = 4 * stream::record_words(stream) * stream.capacity;
+            buffer(&stream::buffer_name(name), Role::Stream, per_path(bytes))
+        }));
+        buffers.extend([
+            buffer("film", Role::Film, film),
+            buffer("pass_info", Role::Pass, fixed(32)),
+        ]);
+        buffers
+    }
+
+    fn needs(&self) -> Needs {
+        let schedule = &self.program.variant.schedule;
+        let mut bindings = self.kernels.iter().flat_map(|(_, bindings)| bindings);
+        let film = bindings.any(|binding| binding.name == "film");
+        Needs {
+            subgroup: schedule.queue == QueueKind::Subgroup,
+            int64_atomics: film && schedule.accumulate == Accumulate::FixedI64,
+            float32_atomics: film && schedule.accumulate == Accumulate::AtomicF32,
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! `package::streams`: what happens to a record that a stage pushes.
+
+use super::queue::stream_constant;
+use super::text::{COMPONENTS, Imports};
+use super::wiring::{WiredStream, Wiring};
+use crate::config::model::{Pipeline, RayKind};
+use crate::config::quantity::LeafType;
+use crate::layout::StateLeaf;
+use std::fmt::Write;
+
+/// The WGSL name of a batched stream's buffer.
+pub(super) fn buffer_name(stream: &str) -> String {
+    format!("{stream}_stream")
+}
+
+/// Words of a stored record: those of the leaves that the consumer reads.
+pub(super) fn record_words(stream: &WiredStream) -> u32 {
+    stream.leaves.iter().map(|leaf| leaf.ty.words()).sum()
+}
+
+/// The module for analysis: pushes that go nowhere.
+pub(super) fn analysis_module(pipeline: &Pipeline) -> String {
+    let mut imports = Imports::default();
+    let mut body = String::new();
+    for (name, stream) in &pipeline.streams {
+        imports.add("state", [stream.record.value.as_str()]);
+        push_nowhere(&mut body, name, &stream.record.value);
+    }
+    format!("{imports}{body}")
+}
+
+/// The module for kernels: batched streams append to their buffer, the others call their consumer.
+pub(super) fn module(pipeline: &Pipeline, wiring: &Wiring) -> String {
+    let mut imports = Imports::default();
+    let mut body = String::new();
+    for (name, declared) in &pipeline.streams {
+        let record = declared.record.value.as_str();
+        imports.add("state", [record]);
+        match wiring.streams.get(name) {
+            Some(stream) if stream.batched => push_batched(&mut imports, &mut body, name, record, stream),
+            Some(stream) => push_inline(&mut imports, &mut body, name, record, stream),
+            None => push_nowhere(&mut body, name, record),
+        }
+    }
+    format!("{imports}{body}")
+}
+
+/// A push that is analysed, or that no live code calls.
+fn push_nowhere(body: &mut String, name: &str, record: &str) {
+    let _ = write!(body, "\nfn push_{name}(record: {record}) {{\n}}\n");
+}
+
+fn push_inline(imports: &mut Imports, body: &mut String, name: &str, record: &str, stream: &WiredStream) {
+    let consumer = stream.entry.name.as_str();
+    imports.add(&stream.entry.module, [consumer]);
+    let count = match stream.rays {
+        None => "",
+        Some(RayKind::Walk) => {
+            imports.add("control", ["count_ray", "walk_rays_word"]);
+            "    count_ray(walk_rays_word());\n"
+        }
+        Some(RayKind::Visibility) => {
+            imports.add("control", ["count_ray", "CONTROL_RAYS_VISIBILITY"]);
+            "    count_ray(CONTROL_RAYS_VISIBILITY);\n"
+        }
+    };
+    let _ = write!(
+        body,
+        "\n/// Resolves a record on the spot.\n\
+         fn push_{name}(record: {record}) {{\n{count}    \
+             var {name} = record;\n    \
+             {consumer}(&{name});\n\
+         }}\n"
+    );
+}
+
+fn push_batched(imports: &mut Imports, body: &mut String, name: &str, record: &str, stream: &WiredStream) {
+    let buffer = buffer_name(name);
+    let constant = stream_constant(name);
+    imports.add("control", ["control", "CONTROL_OVERFLOW"]);
+    imports.add("queue", ["append", constant.as_str()]);
+    imports.add("pass", ["path_count"]);
+    imports.add("real", ["real", "vec2r", "vec3r"]);
+    let capacity = format!("{name}_capacity");
+    let _ = write!(
+        body,
+        "\n/// Records that wait for `{}`, a plane a word.\n\
+         var<storage, read_write> {buffer}: array<u32>;\n\n\
+         /// Records that the stream has room for: as many as a round can push.\n\
+         fn {capacity}() -> u32 {{\n    return {}u * path_count;\n}}\n",
+        stream.entry.name, stream.capacity
+    );
+    let _ = write!(
+        body,
+        "\n/// Keeps a record for the end of the round.\n\
+         fn push_{name}(record: {record}) {{\n    \
+             let index = append({constant});\n    \
+             if index >= {capacity}() {{\n        \
+                 atomicAdd(&control[CONTROL_OVERFLOW], 1u);\n        \
+                 return;\n    \
+             }}\n"
+    );
+    for (value, plane) in stream.leaves.iter().flat_map(word_values).zip(0..) {
+        let _ = writeln!(body, "    {buffer}[{}] = {value};", plane_address(plane, &capacity));
+    }
+    let _ = write!(
+        body,
+        "}}\n\n/// Takes a record out.\n\
+         fn load_{name}(index: u32) -> {record} {{\n    var record: {record};\n"
+    );
+    let mut plane = 0;
+    for leaf in &stream.leaves {
+        let words = leaf.ty.words();
+        let values: Vec<String> = (plane..plane + words)
+            .map(|plane| format!("{buffer}[{}]", plane_address(plane, &capacity)))
+            .collect();
+        plane += words;
+        let _ = writeln!(body, "    {} = {};", path_of(leaf), value_of(leaf.ty, &values));
+    }
+    body.push_str("    return record;\n}\n");
+}
+
+fn plane_address(plane: u32, capacity: &str) -> String {
+    match plane {
+        0 => "index".to_owned(),
+        1 => format!("{capacity}() + index"),
+        _ => format!("{plane}u * {capacity}() + index"),
+    }
+}
+
+fn path_of(leaf: &StateLeaf) -> String {
+    match &leaf.leaf.member {
+        Some(member) => format!("record.{}.{member}", leaf.leaf.field),
+        None => format!("record.{}", leaf.leaf.field),
+    }
+}
+
+/// A leaf as words.
+fn word_values(leaf: &StateLeaf) -> Vec<String> {
+    let path = path_of(leaf);
+    match leaf.ty {
+        LeafType::U32 => vec![path],
+        LeafType::Real => vec![format!("bitcast<u32>({path})")],
+        LeafType::Vec2 | LeafType::Vec3 => COMPONENTS[..leaf.ty.words() as usize]
+            .iter()
+            .map(|component| format!("bitcast<u32>({path}.{component})"))
+            .collect(),
+    }
+}
+
+/// A leaf from words.
+fn value_of(ty: LeafType, words: &[String]) -> String {
+    let joined = words.join(", ");
+    match ty {
+        LeafType::U32 => joined,
+        LeafType::Real => format!("bitcast<real>({joined})"),
+        LeafType::Vec2 => format!("bitcast<vec2r>(vec2u({joined}))"),
+        LeafType::Vec3 => format!("bitcast<vec3r>(vec3u({joined}))"),
+    }
+}

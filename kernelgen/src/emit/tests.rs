@@ -1,0 +1,348 @@
+//! Whole generations of a small pipeline.
+
+use crate::config::model::{Effect, Selection};
+use crate::plan::{Plan, Role, Step};
+use crate::source::{FileKind, Sources};
+use crate::{Generated, Refusal};
+
+const PIPELINE: &str = r#"
+name = "small"
+doc = "Three stages, two outcomes, a stream."
+start = "emit"
+rounds = "max_edges"
+
+[params]
+max_edges = { type = "u32", value = 5 }
+
+[records.Path]
+sample = { quantity = "counter", bits = 19 }
+length = { quantity = "counter", bits = 5 }
+flags = { quantity = "flags", names = ["specular", "bounced"] }
+
+[records.Walk]
+position = "position"
+direction = "unit_vector"
+throughput = "spectrum"
+hit = "hit"
+pdf_w = "pdf"
+scratch = "weight"
+
+[records.Connection]
+origin = "position"
+contribution = "spectrum"
+pixel = "index"
+unread = "length"
+
+[state]
+path = "Path"
+eye = "Walk"
+
+[streams.connection]
+record = "Connection"
+consumer = "resolve"
+rays = "visibility"
+
+[stages]
+emit = { on.emitted = "trace" }
+trace = { entry = "trace_walk", with.walk = "eye", rays = "walk", on.hit = "shade", on.miss = "end" }
+shade = { on.scattered = "trace", on.absorbed = "end" }
+"#;
+
+const STAGES: &str = r#"
+import package::state::{Path, Walk, Connection, FLAGS_BOUNCED};
+import package::outcome::{EMITTED, HIT, MISS, SCATTERED, ABSORBED};
+import package::features::HAS_SKY;
+import package::params::max_edges;
+import package::streams::push_connection;
+import package::film::splat;
+import package::real::vec3r;
+import package::pass::{path_pixel, path_sample};
+
+var<storage, read> spheres: array<vec4f>;
+
+/// Starts a path.
+fn emit(path: ptr<function, Path>, eye: ptr<function, Walk>) -> u32 {
+    path.sample = path_sample();
+    path.length = 0u;
+    path.flags = 0u;
+    eye.position = vec3r(0.0);
+    eye.direction = vec3r(0.0, 0.0, 1.0);
+    eye.throughput = vec3r(1.0);
+    eye.pdf_w = 1.0;
+    eye.scratch = 2.0;
+    return EMITTED;
+}
+
+/// Traces a ray.
+fn trace_walk(walk: ptr<function, Walk>) -> u32 {
+    let sphere = spheres[0];
+    walk.hit.prim = 0u;
+    walk.hit.t = dot(sphere.xyz - walk.position, walk.direction);
+    walk.hit.uv = vec2f(0.0);
+    if HAS_SKY && walk.hit.t < 0.0 {
+        return MISS;
+    }
+    if walk.hit.t < 0.0 {
+        return MISS;
+    }
+    return HIT;
+}
+
+/// Scatters.
+fn shade(path: ptr<function, Path>, eye: ptr<function, Walk>) -> u32 {
+    eye.position += eye.direction * eye.hit.t;
+    var connection: Connection;
+    connection.origin = eye.position;
+    connection.contribution = eye.throughput * eye.pdf_w;
+    connection.pixel = path_pixel();
+    connection.unread = eye.hit.uv.x;
+    push_connection(connection);
+    eye.throughput *= 0.5;
+    path.length += 1u;
+    path.flags |= FLAGS_BOUNCED;
+    if path.length >= max_edges || path.sample == 7u {
+        return ABSORBED;
+    }
+    return SCATTERED;
+}
+
+/// Adds what a connection carries.
+fn resolve(connection: ptr<function, Connection>) {
+    splat(connection.pixel, connection.contribution * connection.origin.z);
+}
+"#;
+
+const LAYOUT: &str = "doc = \"\"\n[layout]\norder = \"aos\"\nlane = 4\ndead = \"drop\"\n";
+const SCHEDULE: &str = "doc = \"\"\n[schedule]\nfuse = []\nqueue = \"subgroup\"\nworkgroup = 64\nload = \"entry\"\nuntil = \"empty\"\naccumulate = \"atomic_f32\"\nbatch = [\"connection\"]\n";
+const PRECISION: &str = "doc = \"\"\n[precision]\nreal = \"f32\"\n";
+
+fn sources(pipeline: &str, layout: &str, stages: &str) -> Sources {
+    let mut sources = Sources::default();
+    for (key, text) in [
+        ("pipelines/p.toml", pipeline),
+        ("layouts/l.toml", layout),
+        ("schedules/s.toml", SCHEDULE),
+        ("precisions/f.toml", PRECISION),
+    ] {
+        sources.add(FileKind::Config, key, format!("configs/{key}"), text);
+    }
+    sources.add(FileKind::Module, "stage/small", "stages/wgsl/stage/small.wgsl", stages);
+    sources
+}
+
+fn selection(set: &[(&str, &str)]) -> Selection {
+    let sky = Effect { present: false, reason: "no sky".to_owned() };
+    Selection {
+        pipeline: "pipelines/p.toml".to_owned(),
+        layout: "layouts/l.toml".to_owned(),
+        schedule: "schedules/s.toml".to_owned(),
+        precision: "precisions/f.toml".to_owned(),
+        set: set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect(),
+        effects: [("sky".to_owned(), sky)].into(),
+    }
+}
+
+fn generated(set: &[(&str, &str)]) -> Generated {
+    let result = crate::generate(&sources(PIPELINE, LAYOUT, STAGES), &selection(set));
+    result.unwrap_or_else(|refusal| panic!("{set:?}\n{}", refusal.render(false)))
+}
+
+fn refusal(pipeline: &str, layout: &str, stages: &str) -> Refusal {
+    crate::generate(&sources(pipeline, layout, stages), &selection(&[])).expect_err("must be refused")
+}
+
+/// The codes of a refusal after one replacement in the pipeline or the stages.
+#[track_caller]
+fn refused(code: &str, from: &str, to: &str) -> String {
+    assert!(PIPELINE.contains(from) || STAGES.contains(from), "{from}");
+    let refusal = refusal(&PIPELINE.replace(from, to), LAYOUT, &STAGES.replace(from, to));
+    let text = refusal.render(false);
+    assert!(refusal.diagnostics.iter().any(|finding| finding.code == code), "{code} not in\n{text}");
+    assert!(refusal.diagnostics.iter().all(|finding| !finding.labels.is_empty()), "{text}");
+    text
+}
+
+fn kernel<'a>(plan: &'a Plan, name: &str) -> &'a crate::plan::Kernel {
+    plan.kernels.iter().find(|kernel| kernel.name == name).unwrap()
+}
+
+#[test]
+fn every_order_and_lane_generates() {
+    for order in ["aos", "soa", "aosoa2", "aosoa32"] {
+        for lane in ["1", "2", "4"] {
+            for dead in ["drop", "keep"] {
+                let set = [("layout.order", order), ("layout.lane", lane), ("layout.dead", dead)];
+                let parts = generated(&set);
+                assert_eq!(parts.report.bytes_per_path, parts.plan.bytes_per_path);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_schedule_generates() {
+    for queue in ["atomic", "subgroup"] {
+        for accumulate in ["atomic_f32", "fixed_i64", "racy"] {
+            for workgroup in ["32", "256"] {
+                let set = [
+                    ("schedule.queue", queue),
+                    ("schedule.accumulate", accumulate),
+                    ("schedule.workgroup", workgroup),
+                ];
+                let needs = generated(&set).plan.needs;
+                assert_eq!(needs.subgroup, queue == "subgroup");
+                assert_eq!(needs.float32_atomics, accumulate == "atomic_f32");
+                assert_eq!(needs.int64_atomics, accumulate == "fixed_i64");
+            }
+        }
+    }
+}
+
+#[test]
+fn equal_input_gives_equal_bytes() {
+    assert_eq!(format!("{:?}", generated(&[])), format!("{:?}", generated(&[])));
+}
+
+#[test]
+fn dead_leaves_are_not_stored() {
+    let parts = generated(&[]);
+    let stored: Vec<&str> =
+        parts.report.tables.iter().flat_map(|table| &table.fields).map(|field| field.name.as_str()).collect();
+    // 3 vectors, pdf, t, and 26 bits: 12 words; prim, uv and scratch are dead, uv since nobody reads `unread`.
+    assert!(!stored.contains(&"eye.scratch"), "{stored:?}");
+    assert!(!stored.contains(&"eye.hit.prim"), "{stored:?}");
+    assert!(stored.contains(&"path.flags") && stored.contains(&"eye.hit.t"), "{stored:?}");
+    assert!(parts.report.dead.iter().any(|dead| dead.name == "eye.scratch"));
+    assert!(generated(&[("layout.dead", "keep")]).plan.bytes_per_path > parts.plan.bytes_per_path);
+}
+
+#[test]
+fn a_round_prepares_queues_before_their_stages() {
+    let plan = generated(&[]).plan;
+    let [Step::Single { .. }, Step::Dispatch { kernel: start }, Step::Loop { rounds: 5, body }, Step::Single { .. }] =
+        plan.program.as_slice()
+    else {
+        panic!("{:?}", plan.program)
+    };
+    assert_eq!(plan.kernels[*start].name, "emit");
+    let names: Vec<&str> = body
+        .iter()
+        .map(|step| match step {
+            Step::Single { kernel } | Step::Indirect { kernel, .. } => plan.kernels[*kernel].name.as_str(),
+            _ => panic!("{step:?}"),
+        })
+        .collect();
+    let expected = [
+        "prepare_trace",
+        "trace",
+        "prepare_shade",
+        "shade",
+        "prepare_connection_stream",
+        "resolve_connection",
+    ];
+    assert_eq!(names, expected);
+    for kernel in plan.kernels.iter().filter(|kernel| !kernel.name.starts_with("prepare")) {
+        let arguments = kernel.bindings.iter().any(|binding| plan.buffers[binding.buffer].role == Role::Arguments);
+        assert!(!arguments, "{}", kernel.name);
+    }
+}
+
+#[test]
+fn an_inline_stream_has_no_buffer() {
+    let plan = generated(&[("schedule.batch", "[]")]).plan;
+    assert!(plan.buffers.iter().all(|buffer| buffer.role != Role::Stream));
+    assert!(kernel(&plan, "shade").module.contains("resolve(&connection)"));
+    assert!(plan.kernels.iter().all(|kernel| kernel.name != "resolve_connection"));
+}
+
+#[test]
+fn a_batched_stream_keeps_what_its_consumer_reads() {
+    let plan = generated(&[]).plan;
+    let stream = plan.buffers.iter().find(|buffer| buffer.role == Role::Stream).unwrap();
+    // `origin` is read as a whole, `contribution` too, `pixel` is one word: 7 words, one record a path and round.
+    assert_eq!(stream.size.per_path, 28);
+}
+
+#[test]
+fn scene_resources_come_last_and_once() {
+    let plan = generated(&[]).plan;
+    let resources: Vec<&str> = plan
+        .buffers
+        .iter()
+        .filter(|buffer| buffer.role == Role::Resource)
+        .map(|buffer| buffer.name.as_str())
+        .collect();
+    assert_eq!(resources, ["spheres"]);
+}
+
+#[test]
+fn explain_names_places() {
+    let report = generated(&[]).report;
+    let text = report.field("eye.hit").unwrap();
+    assert!(text.contains("written by trace (stages/wgsl/stage/small.wgsl:"), "{text}");
+    assert!(text.contains("read by shade (stages/wgsl/stage/small.wgsl:"), "{text}");
+    assert!(report.field("eye.scratch").unwrap().contains("dead:"));
+    assert!(report.field("eye.nothing").is_none());
+    assert!(report.text().contains("table state"));
+}
+
+#[test]
+fn wiring_errors_name_both_sides() {
+    let text = refused("K0203", ", on.absorbed = \"end\"", "");
+    assert!(text.contains("returned here") && text.contains("no `on.absorbed`"), "{text}");
+    refused("K0206", "with.walk = \"eye\", ", "");
+    refused("K0207", "with.walk = \"eye\"", "with.walk = \"path\"");
+    let text = refused("K0208", "entry = \"trace_walk\"", "entry = \"trace_wlak\"");
+    assert!(text.contains("did you mean `trace_walk`?"), "{text}");
+    refused("K0209", "on.scattered = \"trace\"", "on.scattered = \"shade\"");
+    refused("K0210", "    path.length = 0u;\n", "");
+    refused("K0211", "splat(connection.pixel,", "splat(path_pixel(),");
+    refused("K0212", "    splat(connection.pixel, ", "    push_connection(*connection); splat(connection.pixel, ");
+    refused("K0215", "fn resolve(connection: ptr<function, Connection>) {", "fn resolve(connection: ptr<function, Connection>) -> u32 { return 0u; }\nfn other(connection: ptr<function, Connection>) {");
+    refused("K0217", "    push_connection(connection);", "    for (var i = 0u; i < path.length; i += 1u) { push_connection(connection); }");
+}
+
+#[test]
+fn an_outcome_that_no_stage_routes_is_not_a_missing_name() {
+    refused("K0203", "return ABSORBED;", "return LOST;\n    //");
+    let stages = STAGES.replace("ABSORBED", "LOST");
+    let refusal = refusal(PIPELINE, LAYOUT, &stages);
+    assert!(refusal.diagnostics.iter().any(|finding| finding.code == "K0203"), "{}", refusal.render(false));
+}
+
+#[test]
+fn routes_that_are_never_taken_are_warnings() {
+    let pipeline = PIPELINE.replace("on.emitted = \"trace\"", "on.emitted = \"trace\", on.failed = \"end\"");
+    let result = crate::generate(&sources(&pipeline, LAYOUT, STAGES), &selection(&[]));
+    let warnings = result.map_err(|refusal| refusal.render(false)).unwrap().warnings;
+    assert!(warnings.iter().any(|warning| warning.code == "K0204"), "{warnings:?}");
+}
+
+#[test]
+fn an_explicit_placement_is_followed() {
+    let place = r#"
+place = [
+  ["eye.position", "eye.hit.t"],
+  ["eye.direction", "eye.pdf_w"],
+  ["eye.throughput", ["path.sample:19", "_:6", "path.length:5", "path.flags:2"]],
+]
+"#;
+    let layout = format!("{LAYOUT}{place}");
+    let result = crate::generate(&sources(PIPELINE, &layout, STAGES), &selection(&[]));
+    let parts = result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false)));
+    assert_eq!(parts.plan.bytes_per_path, 48);
+    let shade = &kernel(&parts.plan, "shade").module;
+    assert!(shade.contains("path.length = extractBits(state_2.w, 25u, 5u);"), "{shade}");
+}
+
+/// `KERNELS=DIR cargo test -p kernelgen print_kernels -- --ignored` shows what is generated.
+#[test]
+#[ignore = "prints"]
+fn print_kernels() {
+    let parts = generated(&[]);
+    for kernel in &parts.plan.kernels {
+        println!("==== {} {:?}\n{}", kernel.name, kernel.bindings, kernel.module);
+    }
+    println!("{:#?}\n{}", parts.plan.buffers, parts.report.text());
+    println!("{}", parts.report.field("eye.hit").unwrap());
+}

@@ -1,0 +1,505 @@
+//! Stages and stream consumers as they are wired: found, linked, analysed, and checked against what the pipeline says.
+
+use super::entry::{Entries, Entry};
+use super::signature::{Signature, signature};
+use crate::analyze::{self, Flow, FlowStage, Leaf, StageFacts};
+use crate::config::model::{RayKind, Stage, Stream, Variant};
+use crate::config::nearest;
+use crate::diagnostic::Diagnostic;
+use crate::layout::StateLeaf;
+use crate::link::{self, Constant, Constants, Modules, Root};
+use crate::source::Sources;
+use indexmap::{IndexMap, IndexSet};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The texts to link, and what is known about them.
+#[derive(Clone, Copy)]
+pub(super) struct Texts<'a> {
+    pub sources: &'a Sources,
+    pub modules: &'a Modules,
+    pub constants: &'a Constants,
+    /// Outcome names in order of their values.
+    pub outcomes: &'a IndexSet<String>,
+}
+
+/// Everything that the start stage can reach.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Wiring {
+    /// Stages, in the order of the pipeline.
+    pub stages: IndexMap<String, WiredStage>,
+    /// Streams that one of them pushes to, in the order of the pipeline.
+    pub streams: IndexMap<String, WiredStream>,
+    /// Outcomes that never come, stages that nothing reaches.
+    pub warnings: Vec<Diagnostic>,
+    /// Effects that a stage asks for: `HAS_SKY`.
+    pub effects_seen: BTreeSet<String>,
+}
+
+/// A stage.
+#[derive(Clone, Debug)]
+pub(super) struct WiredStage {
+    pub entry: Entry,
+    pub facts: StageFacts,
+    /// The instance of each parameter, and its record.
+    pub instances: Vec<(String, String)>,
+    /// Returned outcomes (lower case) and the stages they lead to; those that end the path are left out.
+    pub routes: Vec<(String, String)>,
+    pub rays: Option<RayKind>,
+}
+
+/// A stream with its consumer.
+#[derive(Clone, Debug)]
+pub(super) struct WiredStream {
+    pub entry: Entry,
+    pub batched: bool,
+    /// Leaves of the record that the consumer reads, in the order of the record.
+    pub leaves: Vec<StateLeaf>,
+    /// Most records of a path between two runs of the consumer.
+    pub capacity: u32,
+    pub rays: Option<RayKind>,
+}
+
+impl Wiring {
+    /// Whether the loop runs this stage: every stage but one that only starts paths.
+    pub(super) fn is_looped(&self, stage: &str) -> bool {
+        self.stages.values().any(|other| other.routes.iter().any(|(_, target)| target == stage))
+    }
+
+    /// The graph for liveness.
+    pub(super) fn flow(&self, start: &str) -> Flow {
+        let stage = |(name, stage): (&String, &WiredStage)| {
+            let next: IndexSet<String> = stage.routes.iter().map(|(_, target)| target.clone()).collect();
+            let flow = FlowStage { facts: stage.facts.clone(), next: next.into_iter().collect() };
+            (name.clone(), flow)
+        };
+        Flow { stages: self.stages.iter().map(stage).collect(), start: start.to_owned() }
+    }
+}
+
+/// Finds, links and checks all stages from the start on, then the consumers of the streams they push to.
+///
+/// # Errors
+/// K0203 an outcome without a route, K0206 a parameter that is no instance, K0207 one of another record, K0208 a missing function,
+/// K0209 a stage that routes to itself, K0211 a consumer that asks for its path, K0212 a consumer that pushes, K0215 a function that
+/// is no stage, K0217 pushes to a batched stream in a loop; K03xx of the stage texts.
+/// Warnings: K0204 an outcome that never comes, K0205 a stage that nothing reaches.
+pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Diagnostic>> {
+    let mut wirer = Wirer {
+        texts,
+        variant,
+        entries: Entries::scan(texts.sources, texts.modules),
+        found: BTreeMap::new(),
+        wiring: Wiring::default(),
+        findings: Vec::new(),
+    };
+    let reached = wirer.reach();
+    wirer.keep_reached(&reached);
+    wirer.wire_streams();
+    if wirer.findings.is_empty() { Ok(wirer.wiring) } else { Err(distinct(wirer.findings)) }
+}
+
+/// One finding may come up in every stage that shares a helper.
+fn distinct(findings: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let mut kept: Vec<Diagnostic> = Vec::new();
+    for finding in findings {
+        if !kept.contains(&finding) {
+            kept.push(finding);
+        }
+    }
+    kept
+}
+
+struct Wirer<'a> {
+    texts: Texts<'a>,
+    variant: &'a Variant,
+    entries: Entries,
+    found: BTreeMap<String, WiredStage>,
+    wiring: Wiring,
+    findings: Vec<Diagnostic>,
+}
+
+/// A linked and analysed function.
+struct Analysed {
+    entry: Entry,
+    signature: Signature,
+    facts: StageFacts,
+    /// Whether the text may have lost code to an absent effect.
+    pruned: bool,
+}
+
+impl Wirer<'_> {
+    /// Wires stages from the start on, and says which were reached; a stage with errors reaches all that it routes to.
+    fn reach(&mut self) -> BTreeSet<String> {
+        let pipeline = &self.variant.pipeline;
+        let mut open = vec![pipeline.start.value.clone()];
+        let mut reached = BTreeSet::from([pipeline.start.value.clone()]);
+        while let Some(name) = open.pop() {
+            let Some(stage) = pipeline.stages.get(&name) else { continue };
+            let targets: Vec<String> = match self.wire_stage(&name, stage) {
+                Ok(wired) => {
+                    let targets = wired.routes.iter().map(|(_, target)| target.clone()).collect();
+                    self.found.insert(name, wired);
+                    targets
+                }
+                Err(findings) => {
+                    self.findings.extend(findings);
+                    stage.on.values().map(|target| target.value.clone()).collect()
+                }
+            };
+            open.extend(targets.into_iter().filter(|target| reached.insert(target.clone())));
+        }
+        reached
+    }
+
+    fn keep_reached(&mut self, reached: &BTreeSet<String>) {
+        for (name, stage) in &self.variant.pipeline.stages {
+            if let Some(wired) = self.found.remove(name) {
+                self.wiring.stages.insert(name.clone(), wired);
+            } else if !reached.contains(name) && !self.has_absent_effect() {
+                let message = format!("no outcome leads to stage `{name}`");
+                self.wiring.warnings.push(
+                    Diagnostic::warning("K0205", message)
+                        .at(stage.span, "not generated")
+                        .help(format!("route an outcome to it: `on.x = \"{name}\"`")),
+                );
+            }
+        }
+    }
+
+    /// Whether stages ask for an effect that is absent: what it alone would return or reach is missing for a good reason.
+    fn has_absent_effect(&self) -> bool {
+        self.wiring.effects_seen.iter().any(|name| self.is_absent(name))
+    }
+
+    fn is_absent(&self, name: &str) -> bool {
+        let key = ("features".to_owned(), name.to_owned());
+        self.texts.constants.get(&key) == Some(&Constant::Bool(false))
+    }
+
+    fn wire_stage(&mut self, name: &str, stage: &Stage) -> Result<WiredStage, Vec<Diagnostic>> {
+        let pipeline = &self.variant.pipeline;
+        let instance_of = |param: &str| match stage.with.get(param) {
+            Some(instance) => Some(instance.value.clone()),
+            None => pipeline.state.contains_key(param).then(|| param.to_owned()),
+        };
+        let entry = self.entries.find(&stage.entry).map_err(|finding| vec![finding])?.clone();
+        let (texts, variant) = (self.texts, self.variant);
+        let analysed = self.analyse(entry, |entry, signature| {
+            check_stage_signature(variant, name, stage, entry, signature, texts)
+        }, &instance_of)?;
+        self.check_outcomes(name, stage, &analysed)?;
+        let routes = analysed.facts.outcomes.keys().filter_map(|outcome| {
+            let target = &stage.on.get(outcome)?.value;
+            (target != "end").then(|| (outcome.clone(), target.clone()))
+        });
+        let order = |(outcome, _): &(String, String)| stage.on.get_index_of(outcome);
+        let mut routes: Vec<(String, String)> = routes.collect();
+        routes.sort_by_key(order);
+        let instances = analysed.signature.params.iter().filter_map(|(param, _)| {
+            let instance = instance_of(param)?;
+            let record = pipeline.state.get(&instance)?.value.clone();
+            Some((instance, record))
+        });
+        Ok(WiredStage {
+            instances: instances.collect(),
+            entry: analysed.entry,
+            facts: analysed.facts,
+            routes,
+            rays: stage.rays,
+        })
+    }
+
+    /// Links and parses a function, checks its signature, then finds its facts.
+    fn analyse(
+        &mut self,
+        entry: Entry,
+        check: impl Fn(&Entry, &Signature) -> Vec<Diagnostic>,
+        bind: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<Analysed, Vec<Diagnostic>> {
+        let texts = self.texts;
+        let root = Root { module: &entry.module, item: &entry.name };
+        let linked = link::link(texts.sources, texts.modules, texts.constants, root)?;
+        let module = analyze::parse(&linked)?;
+        let signature = signature(&module, &entry.name);
+        let findings = check(&entry, &signature);
+        if !findings.is_empty() {
+            return Err(findings);
+        }
+        let outcomes = texts.outcomes.iter().zip(0..).map(|(name, value)| (value, name.clone()));
+        let facts = analyze::stage_facts(&module, &linked, &entry.name, bind, &outcomes.collect())?;
+        let pruned = linked.constants_seen.iter().any(|name| self.is_absent(name));
+        self.wiring.effects_seen.extend(linked.constants_seen);
+        Ok(Analysed { entry, signature, facts, pruned })
+    }
+
+    fn check_outcomes(
+        &mut self,
+        name: &str,
+        stage: &Stage,
+        analysed: &Analysed,
+    ) -> Result<(), Vec<Diagnostic>> {
+        let mut findings = Vec::new();
+        let returned = &analysed.facts.outcomes;
+        for (outcome, place) in returned.iter().filter(|(outcome, _)| *outcome != "end") {
+            match stage.on.get(outcome) {
+                None => {
+                    let message = format!("outcome `{outcome}` of stage `{name}` leads nowhere");
+                    findings.push(
+                        Diagnostic::error("K0203", message)
+                            .at(*place, "returned here")
+                            .also(stage.span, format!("no `on.{outcome}` in this table"))
+                            .help(self.route_help(outcome, stage)),
+                    );
+                }
+                Some(target) if target.value == name => {
+                    let message = format!("stage `{name}` routes `{outcome}` to itself");
+                    findings.push(
+                        Diagnostic::error("K0209", message)
+                            .at(target.span, "a queue cannot be filled while it is emptied")
+                            .help("loop inside the stage function, or route through a second stage with the same `entry`"),
+                    );
+                }
+                Some(_) => {}
+            }
+        }
+        let never = stage.on.iter().filter(|(outcome, _)| !returned.contains_key(*outcome));
+        if !analysed.pruned {
+            self.wiring.warnings.extend(never.map(|(outcome, target)| {
+                let message = format!("stage `{name}` never returns outcome `{outcome}`");
+                Diagnostic::warning("K0204", message)
+                    .at(target.span, "this route is never taken")
+                    .also(analysed.entry.span, format!("no `return {}`", outcome.to_uppercase()))
+            }));
+        }
+        if findings.is_empty() { Ok(()) } else { Err(findings) }
+    }
+
+    fn route_help(&self, outcome: &str, stage: &Stage) -> String {
+        let routed = stage.on.values().map(|target| target.value.as_str()).find(|target| *target != "end");
+        let example = routed.or_else(|| self.variant.pipeline.stages.keys().map(String::as_str).next());
+        match example {
+            Some(target) => format!("add `on.{outcome} = \"{target}\"`, or `on.{outcome} = \"end\"`"),
+            None => format!("add `on.{outcome} = \"end\"`"),
+        }
+    }
+
+    fn wire_streams(&mut self) {
+        let variant = self.variant;
+        for (name, stream) in &variant.pipeline.streams {
+            if !self.wiring.stages.values().any(|stage| stage.facts.pushes.contains_key(name)) {
+                continue;
+            }
+            match self.wire_stream(name, stream) {
+                Ok(wired) => {
+                    self.wiring.streams.insert(name.clone(), wired);
+                }
+                Err(findings) => self.findings.extend(findings),
+            }
+        }
+    }
+
+    fn wire_stream(&mut self, name: &str, stream: &Stream) -> Result<WiredStream, Vec<Diagnostic>> {
+        let variant = self.variant;
+        let batched = variant.schedule.batch.iter().any(|batch| batch.value == name);
+        let entry = self.entries.find(&stream.consumer).map_err(|finding| vec![finding])?.clone();
+        let bind = |_: &str| Some(name.to_owned());
+        let analysed = self.analyse(entry, |entry, signature| {
+            check_consumer_signature(name, stream, entry, signature)
+        }, &bind)?;
+        check_consumer(name, stream, &analysed)?;
+        let capacity = if batched { self.capacity(name)? } else { 0 };
+        Ok(WiredStream {
+            leaves: read_leaves(variant, name, stream, &analysed.facts),
+            entry: analysed.entry,
+            batched,
+            capacity,
+            rays: stream.rays,
+        })
+    }
+
+    /// Most records of a path until the consumer runs: every stage once, and the start stage before the first round.
+    fn capacity(&self, stream: &str) -> Result<u32, Vec<Diagnostic>> {
+        let mut findings = Vec::new();
+        let mut capacity = 0;
+        let start = &self.variant.pipeline.start.value;
+        for (name, stage) in &self.wiring.stages {
+            let runs = u32::from(self.wiring.is_looped(name)) + u32::from(name == start);
+            match stage.facts.pushes.get(stream) {
+                Some(Some(pushes)) => capacity += pushes * runs,
+                Some(None) => {
+                    let message = format!("stage `{name}` pushes to `{stream}` in a loop");
+                    findings.push(
+                        Diagnostic::error("K0217", message)
+                            .at(stage.entry.span, "how often cannot be told, so neither how much room the stream needs")
+                            .help(format!("push outside of loops, or take `{stream}` out of `schedule.batch`")),
+                    );
+                }
+                None => {}
+            }
+        }
+        if findings.is_empty() { Ok(capacity) } else { Err(findings) }
+    }
+}
+
+fn read_leaves(variant: &Variant, name: &str, stream: &Stream, facts: &StageFacts) -> Vec<StateLeaf> {
+    let Some(record) = variant.pipeline.records.get(&stream.record.value) else { return Vec::new() };
+    let leaves = record.fields.iter().flat_map(|(field, declared)| {
+        declared.quantity.leaves().into_iter().map(move |shape| StateLeaf {
+            leaf: Leaf {
+                instance: name.to_owned(),
+                field: field.clone(),
+                member: shape.member.map(str::to_owned),
+            },
+            ty: shape.ty,
+            bits: shape.bits,
+        })
+    });
+    leaves.filter(|leaf| facts.reads.contains_key(&leaf.leaf)).collect()
+}
+
+fn check_stage_signature(
+    variant: &Variant,
+    name: &str,
+    stage: &Stage,
+    entry: &Entry,
+    signature: &Signature,
+    texts: Texts<'_>,
+) -> Vec<Diagnostic> {
+    let pipeline = &variant.pipeline;
+    let place = |param: &str| entry.params.get(param).copied().unwrap_or(entry.span);
+    let mut findings = Vec::new();
+    let mut taken: BTreeMap<String, String> = BTreeMap::new();
+    for (param, record) in &signature.params {
+        let bound = stage.with.get(param).map(|instance| instance.value.as_str()).unwrap_or(param);
+        let Some(declared) = pipeline.state.get(bound) else {
+            findings.push(no_instance(variant, name, stage, param, bound, place(param)));
+            continue;
+        };
+        if record.as_ref() != Some(&declared.value) {
+            let is = match record {
+                Some(record) => format!("takes a `ptr<function, {record}>`"),
+                None => "is no pointer to a record in function space".to_owned(),
+            };
+            let message = format!("parameter `{param}` of stage `{name}` {is}, but `{bound}` is a `{}`", declared.value);
+            findings.push(
+                Diagnostic::error("K0207", message)
+                    .at(place(param), format!("should be `ptr<function, {}>`", declared.value))
+                    .also(declared.span, format!("`{bound}` is declared here"))
+                    .help(format!("give it an instance of its record: `with.{param} = ..`")),
+            );
+        }
+        if let Some(other) = taken.insert(bound.to_owned(), param.clone()) {
+            let message = format!("parameters `{other}` and `{param}` of stage `{name}` both stand for `{bound}`");
+            findings.push(
+                Diagnostic::error("K0206", message)
+                    .at(stage.span, "wired here")
+                    .also(place(param), "WGSL forbids two pointers to one variable")
+                    .help(format!("give one of them another instance: `with.{param} = ..`")),
+            );
+        }
+    }
+    for (param, instance) in &stage.with {
+        if !signature.params.iter().any(|(name, _)| name == param) {
+            let names = signature.params.iter().map(|(name, _)| name.as_str());
+            let help = match nearest(param, names.clone()) {
+                Some(near) => format!("did you mean `with.{near}`?"),
+                None => format!("its parameters are {}", names.collect::<Vec<_>>().join(", ")),
+            };
+            let message = format!("stage `{name}` has no parameter `{param}`");
+            findings.push(
+                Diagnostic::error("K0206", message)
+                    .at(instance.span, "given here")
+                    .also(entry.span, format!("`{}` does not have it", entry.name))
+                    .help(help),
+            );
+        }
+    }
+    if !signature.returns_u32 {
+        let outcomes: Vec<String> = texts.outcomes.iter().map(|name| name.to_uppercase()).collect();
+        let message = format!("stage function `{}` must return an outcome, a `u32`", entry.name);
+        findings.push(
+            Diagnostic::error("K0215", message)
+                .at(entry.span, "should end in `-> u32`")
+                .help(format!("return one of {}", outcomes.join(", "))),
+        );
+    }
+    findings
+}
+
+fn no_instance(
+    variant: &Variant,
+    name: &str,
+    stage: &Stage,
+    param: &str,
+    bound: &str,
+    place: crate::source::Span,
+) -> Diagnostic {
+    let names = || variant.pipeline.state.keys().map(String::as_str);
+    let help = match nearest(bound, names()) {
+        Some(near) => format!("add `with.{param} = \"{near}\"`"),
+        None => format!("add `with.{param} = ..` with one of {}", names().collect::<Vec<_>>().join(", ")),
+    };
+    Diagnostic::error("K0206", format!("parameter `{param}` of stage `{name}` is no instance"))
+        .at(place, format!("`{bound}` is not in [state]"))
+        .also(stage.span, "wired here")
+        .help(help)
+}
+
+fn check_consumer_signature(
+    name: &str,
+    stream: &Stream,
+    entry: &Entry,
+    signature: &Signature,
+) -> Vec<Diagnostic> {
+    let record = &stream.record.value;
+    let mut findings = Vec::new();
+    match signature.params.as_slice() {
+        [(_, Some(taken))] if taken == record => {}
+        [(_, Some(taken))] => {
+            let message = format!("the consumer of stream `{name}` takes a `{taken}`, but the stream carries `{record}`");
+            findings.push(
+                Diagnostic::error("K0207", message)
+                    .at(entry.span, format!("its parameter should be `ptr<function, {record}>`"))
+                    .also(stream.record.span, "the stream's record"),
+            );
+        }
+        _ => {
+            let message = format!("the consumer of stream `{name}` must take one record");
+            findings.push(
+                Diagnostic::error("K0206", message)
+                    .at(entry.span, format!("its parameter should be `ptr<function, {record}>`, its only one"))
+                    .also(stream.consumer.span, "wired here"),
+            );
+        }
+    }
+    if !signature.returns_nothing {
+        let message = format!("the consumer of stream `{name}` must return nothing");
+        findings.push(
+            Diagnostic::error("K0215", message)
+                .at(entry.span, "nothing takes what it returns")
+                .also(stream.consumer.span, "wired here"),
+        );
+    }
+    findings
+}
+
+/// A consumer must do the same whether it runs on the spot or at the end of the round.
+fn check_consumer(name: &str, stream: &Stream, analysed: &Analysed) -> Result<(), Vec<Diagnostic>> {
+    let mut findings = Vec::new();
+    if analysed.facts.globals.contains("path_id") {
+        findings.push(
+            Diagnostic::error("K0211", format!("the consumer of stream `{name}` asks for its path"))
+                .at(analysed.entry.span, "uses `path_id`, `path_pixel` or `path_sample`")
+                .also(stream.span, "a batched stream has left its path behind")
+                .help(format!("carry the value in a field of `{}`", stream.record.value)),
+        );
+    }
+    if let Some(pushed) = analysed.facts.pushes.keys().next() {
+        findings.push(
+            Diagnostic::error("K0212", format!("the consumer of stream `{name}` pushes to `{pushed}`"))
+                .at(analysed.entry.span, "a consumer cannot push")
+                .help("push from a stage"),
+        );
+    }
+    if findings.is_empty() { Ok(()) } else { Err(findings) }
+}

@@ -1,0 +1,169 @@
+//! The plan: what the runtime allocates and runs, as data. The runtime interprets it and knows no stage and no field by name.
+
+use crate::config::model::{Accumulate, RayKind};
+use serde::Serialize;
+
+/// Buffers, kernels and the program of one pass.
+///
+/// A pass takes `active` path slots (at most `path_count`) through the program once. The runtime writes the `pass_info` uniform
+/// (see `Role::Pass`) before it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Plan {
+    /// What the runtime allocates or provides; kernels name them by index.
+    pub buffers: Vec<Buffer>,
+    /// The kernels; every text is a whole WGSL module, validated.
+    pub kernels: Vec<Kernel>,
+    /// The steps of one pass, in order.
+    pub program: Vec<Step>,
+    /// Words of the control buffer that the host reads after a pass; all are zeroed by the program's first step and count one pass.
+    pub counters: Vec<Counter>,
+    /// How film words are to be read.
+    pub film: Accumulate,
+    /// Bytes of state a path slot takes, all tables.
+    pub bytes_per_path: u32,
+    /// Whether kernels use subgroup operations, f16, f64, 64-bit atomics or float atomics: features to ask of the adapter.
+    pub needs: Needs,
+}
+
+/// Device features that the kernels use.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Needs {
+    /// Subgroup operations.
+    pub subgroup: bool,
+    /// `atomic<i64>`.
+    pub int64_atomics: bool,
+    /// `atomic<f32>`.
+    pub float32_atomics: bool,
+}
+
+/// A buffer.
+#[derive(Clone, Debug, Serialize)]
+pub struct Buffer {
+    /// Its WGSL name.
+    pub name: String,
+    /// What it is for.
+    pub role: Role,
+    /// Its size; zero for those that the runtime provides.
+    pub size: Size,
+}
+
+/// What a buffer is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// A table of path state.
+    State,
+    /// Queues of path slots.
+    Queue,
+    /// Counters that kernels and host share (storage, copy source).
+    Control,
+    /// Arguments of indirect dispatches, three words a slot (storage and indirect; never bound in a kernel that is dispatched indirectly).
+    Arguments,
+    /// Records of a stream.
+    Stream,
+    /// The film: three channels a pixel, interleaved, one f32 or i64 each. The runtime zeroes it at the start and reads it.
+    Film,
+    /// Uniform, 32 bytes, written by the runtime before each pass: u32 first_pixel, first_sample, active, width, height, seed, 0, 0.
+    /// Slot i works on linear = first_pixel + i; sample = first_sample + linear / (width*height); pixel = tile order of linear % (width*height).
+    Pass,
+    /// A scene resource that the runtime provides under this name.
+    Resource,
+}
+
+/// A size in bytes: fixed + per_path * path_count.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Size {
+    /// Bytes whatever the number of paths.
+    pub fixed: u64,
+    /// Bytes a path slot.
+    pub per_path: u64,
+    /// Bytes a pixel.
+    pub per_pixel: u64,
+}
+
+/// A kernel.
+#[derive(Clone, Debug, Serialize)]
+pub struct Kernel {
+    /// Its name, also of its file and entry point (`trace_eye_main` has name `trace_eye`).
+    pub name: String,
+    /// The entry point.
+    pub entry: String,
+    /// The WGSL text. It has `override path_count: u32` if `uses_path_count`.
+    pub module: String,
+    /// Whether the module declares `override path_count`.
+    pub uses_path_count: bool,
+    /// Bindings of group 0.
+    pub bindings: Vec<Binding>,
+    /// Threads in a workgroup.
+    pub workgroup: u32,
+    /// Stages inside; empty for the generated housekeeping kernels.
+    pub stages: Vec<String>,
+    /// Bytes of path state that a path loads.
+    pub load_bytes: u32,
+    /// Bytes of path state that a path stores.
+    pub store_bytes: u32,
+    /// What its rays are counted as.
+    pub rays: Option<RayKind>,
+}
+
+/// A binding of a kernel.
+#[derive(Clone, Debug, Serialize)]
+pub struct Binding {
+    /// Binding number in group 0.
+    pub binding: u32,
+    /// Index into `Plan::buffers`.
+    pub buffer: usize,
+    /// How the kernel uses it.
+    pub access: Access,
+}
+
+/// How a kernel uses a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Access {
+    /// `var<uniform>`.
+    Uniform,
+    /// `var<storage, read>`.
+    Read,
+    /// `var<storage, read_write>`.
+    ReadWrite,
+}
+
+/// A step of the program.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "snake_case", tag = "step")]
+pub enum Step {
+    /// Enough workgroups for `active` threads, folded to two dimensions: x = min(groups, 65535), y = ceil(groups / 65535).
+    Dispatch {
+        /// Index into `Plan::kernels`.
+        kernel: usize,
+    },
+    /// A single workgroup.
+    Single {
+        /// Index into `Plan::kernels`.
+        kernel: usize,
+    },
+    /// As many workgroups as the three words at `slot` of the arguments buffer say.
+    Indirect {
+        /// Index into `Plan::kernels`.
+        kernel: usize,
+        /// Which triple of the arguments buffer.
+        slot: u32,
+    },
+    /// The body, this many times; empty queues make its dispatches empty.
+    Loop {
+        /// How often.
+        rounds: u32,
+        /// What.
+        body: Vec<Step>,
+    },
+}
+
+/// A word of the control buffer.
+#[derive(Clone, Debug, Serialize)]
+pub struct Counter {
+    /// `rays_primary`, `rays_secondary`, `rays_deep`, `rays_visibility`, `rejected`, `overflow`, `unfinished`.
+    pub name: String,
+    /// Word index in the control buffer.
+    pub word: u32,
+}

@@ -1,0 +1,389 @@
+//! What lives where, who reads and writes it, what is dead and why: as JSON keys and as tables for people.
+
+use crate::analyze::{Leaf, Liveness, StageFacts};
+use crate::config::model::{Order, Variant};
+use crate::config::quantity::LeafType;
+use crate::layout::{self, Placement, StateLeaf};
+use crate::plan::Plan;
+use crate::source::{Sources, Span};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+/// The report on a variant.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Names of the pipeline, layout, schedule and precision.
+    pub variant: [String; 4],
+    /// Bytes of state a path takes, all tables.
+    pub bytes_per_path: u32,
+    /// Tables of state.
+    pub tables: Vec<TableReport>,
+    /// Kernels, in the order of the plan.
+    pub kernels: Vec<KernelReport>,
+    /// Fields that are stored nowhere.
+    pub dead: Vec<Reason>,
+    /// Effects of the scene.
+    pub effects: EffectsReport,
+    #[serde(skip)]
+    fields: Vec<FieldUse>,
+}
+
+/// A table.
+#[derive(Clone, Debug, Serialize)]
+pub struct TableReport {
+    /// Its name.
+    pub name: String,
+    /// Bytes a path.
+    pub bytes: u32,
+    /// How records are interleaved: `aos`, `soa`, `aosoa32`.
+    pub order: String,
+    /// Words in a lane.
+    pub lane: u32,
+    /// Stored fields, in the order of their words.
+    pub fields: Vec<FieldReport>,
+}
+
+/// A stored leaf.
+#[derive(Clone, Debug, Serialize)]
+pub struct FieldReport {
+    /// `eye.hit.prim`.
+    pub name: String,
+    /// `f32`, `u32` or `bits`.
+    pub codec: String,
+    /// Bits it takes.
+    pub bits: u32,
+    /// Its first word in the path's record.
+    pub word: u32,
+    /// All its words.
+    pub words: Vec<u32>,
+    /// Its lowest bit in the word.
+    pub shift: u32,
+    /// Fields that live in the same bits at other times.
+    pub shares: Vec<String>,
+}
+
+/// A kernel.
+#[derive(Clone, Debug, Serialize)]
+pub struct KernelReport {
+    /// Its name.
+    pub name: String,
+    /// Its stages; none for housekeeping and for stream consumers.
+    pub stages: Vec<String>,
+    /// Bytes of state that a path loads.
+    pub load_bytes: u32,
+    /// Bytes of state that a path stores.
+    pub store_bytes: u32,
+    /// Leaves it loads.
+    pub loads: Vec<String>,
+    /// Leaves it stores.
+    pub stores: Vec<String>,
+}
+
+/// A name and why it is there.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reason {
+    /// The name.
+    pub name: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Effects of the scene, and whether a kernel asks for them.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct EffectsReport {
+    /// Effects that the scene calls for.
+    pub kept: Vec<Reason>,
+    /// Effects that it does not: their code is not generated.
+    pub dropped: Vec<Reason>,
+    /// Effects of either kind that no stage of this pipeline asks for.
+    pub unused: Vec<String>,
+}
+
+/// Where a leaf is used, for `explain VARIANT FIELD`.
+#[derive(Clone, Debug)]
+struct FieldUse {
+    leaf: String,
+    field: String,
+    quantity: &'static str,
+    words: u32,
+    written: Vec<String>,
+    read: Vec<String>,
+    live_out: Vec<String>,
+    stored: Option<String>,
+    dead: Option<String>,
+}
+
+/// What a report is made of.
+pub(crate) struct Findings<'a> {
+    pub sources: &'a Sources,
+    pub variant: &'a Variant,
+    pub plan: &'a Plan,
+    pub placement: &'a Placement,
+    pub liveness: &'a Liveness,
+    pub stages: Vec<(&'a str, &'a StageFacts)>,
+    pub effects_seen: &'a BTreeSet<String>,
+}
+
+/// Collects the report.
+pub(crate) fn build(findings: &Findings<'_>) -> Report {
+    let variant = findings.variant;
+    let leaves = layout::state_leaves(&variant.pipeline);
+    Report {
+        variant: [
+            variant.pipeline.name.clone(),
+            variant.layout.name.clone(),
+            variant.schedule.name.clone(),
+            variant.precision.name.clone(),
+        ],
+        bytes_per_path: findings.plan.bytes_per_path,
+        tables: tables(findings, &leaves),
+        kernels: kernels(findings),
+        dead: findings
+            .liveness
+            .dead
+            .iter()
+            .map(|(leaf, reason)| Reason { name: leaf.to_string(), reason: reason.clone() })
+            .collect(),
+        effects: effects(findings),
+        fields: leaves.iter().map(|leaf| field_use(findings, leaf)).collect(),
+    }
+}
+
+fn tables(findings: &Findings<'_>, leaves: &[StateLeaf]) -> Vec<TableReport> {
+    let placement = findings.placement;
+    let types: BTreeMap<&Leaf, LeafType> = leaves.iter().map(|leaf| (&leaf.leaf, leaf.ty)).collect();
+    let table = |(index, table): (usize, &layout::Table)| {
+        let own = placement.slots.iter().filter(|(_, slot)| slot.table == index);
+        let mut fields: Vec<FieldReport> = own.map(|(leaf, slot)| field(leaf, slot, &types)).collect();
+        fields.sort_by_key(|field| (field.word, field.shift));
+        TableReport {
+            name: table.name.clone(),
+            bytes: table.bytes_per_path(),
+            order: order(table.order),
+            lane: table.lane,
+            fields,
+        }
+    };
+    placement.tables.iter().enumerate().map(table).collect()
+}
+
+fn order(order: Order) -> String {
+    match order {
+        Order::Aos => "aos".to_owned(),
+        Order::Soa => "soa".to_owned(),
+        Order::Aosoa(block) => format!("aosoa{block}"),
+    }
+}
+
+fn field(leaf: &Leaf, slot: &layout::Slot, types: &BTreeMap<&Leaf, LeafType>) -> FieldReport {
+    let codec = match types.get(leaf) {
+        _ if slot.bits < 32 => "bits",
+        Some(LeafType::U32) | None => "u32",
+        Some(_) => "f32",
+    };
+    FieldReport {
+        name: leaf.to_string(),
+        codec: codec.to_owned(),
+        bits: slot.bits * slot.words.len() as u32,
+        word: slot.words.first().copied().unwrap_or_default(),
+        words: slot.words.clone(),
+        shift: slot.shift,
+        shares: Vec::new(),
+    }
+}
+
+fn kernels(findings: &Findings<'_>) -> Vec<KernelReport> {
+    let report = |kernel: &crate::plan::Kernel| {
+        let traffic = kernel.stages.iter().filter_map(|stage| findings.liveness.kernels.get(stage));
+        let traffic: Vec<_> = traffic.collect();
+        let names = |leaves: &BTreeSet<Leaf>| leaves.iter().map(Leaf::to_string).collect::<Vec<_>>();
+        KernelReport {
+            name: kernel.name.clone(),
+            stages: kernel.stages.clone(),
+            load_bytes: kernel.load_bytes,
+            store_bytes: kernel.store_bytes,
+            loads: traffic.iter().flat_map(|traffic| names(&traffic.loads)).collect(),
+            stores: traffic.iter().flat_map(|traffic| names(&traffic.stores)).collect(),
+        }
+    };
+    findings.plan.kernels.iter().map(report).collect()
+}
+
+fn effects(findings: &Findings<'_>) -> EffectsReport {
+    let mut report = EffectsReport::default();
+    for (name, effect) in &findings.variant.effects {
+        let reason = Reason { name: name.clone(), reason: effect.reason.clone() };
+        if effect.present {
+            report.kept.push(reason);
+        } else {
+            report.dropped.push(reason);
+        }
+        if !findings.effects_seen.contains(&format!("HAS_{}", name.to_uppercase())) {
+            report.unused.push(name.clone());
+        }
+    }
+    report
+}
+
+fn field_use(findings: &Findings<'_>, declared: &StateLeaf) -> FieldUse {
+    let leaf = &declared.leaf;
+    let pipeline = &findings.variant.pipeline;
+    let record = pipeline.state.get(&leaf.instance).and_then(|record| pipeline.records.get(&record.value));
+    let quantity = record.and_then(|record| record.fields.get(&leaf.field));
+    let at = |stage: &str, span: &Span| format!("{stage} ({})", place(findings.sources, *span));
+    let mut written = Vec::new();
+    let mut read = Vec::new();
+    for (stage, facts) in &findings.stages {
+        written.extend(facts.writes.get(leaf).map(|span| at(stage, span)));
+        written.extend(facts.maybe.get(leaf).map(|span| format!("{}, perhaps", at(stage, span))));
+        read.extend(facts.reads.get(leaf).map(|span| at(stage, span)));
+    }
+    let live_out = findings.liveness.kernels.iter().filter(|(_, traffic)| traffic.live_out.contains(leaf));
+    FieldUse {
+        leaf: leaf.to_string(),
+        field: format!("{}.{}", leaf.instance, leaf.field),
+        quantity: quantity.map_or("", |field| field.quantity.name()),
+        words: declared.ty.words(),
+        written,
+        read,
+        live_out: live_out.map(|(stage, _)| stage.clone()).collect(),
+        stored: findings.placement.slots.get(leaf).map(|slot| stored(findings.placement, slot)),
+        dead: findings.liveness.dead.get(leaf).cloned(),
+    }
+}
+
+fn stored(placement: &Placement, slot: &layout::Slot) -> String {
+    let table = &placement.tables[slot.table].name;
+    let words: Vec<String> = slot.words.iter().map(u32::to_string).collect();
+    let noun = if words.len() == 1 { "word" } else { "words" };
+    let bits = match slot.bits {
+        32 => String::new(),
+        bits => format!(", bits {} to {}", slot.shift, slot.shift + bits - 1),
+    };
+    format!("{noun} {}{bits} of table {table}", words.join(", "))
+}
+
+/// `stages/trace.wgsl:40`.
+fn place(sources: &Sources, span: Span) -> String {
+    let Some(file) = sources.get(span.file) else { return String::new() };
+    let before = file.text.get(..span.start as usize).unwrap_or("");
+    format!("{}:{}", file.name, before.matches('\n').count() + 1)
+}
+
+impl Report {
+    /// The report as aligned tables.
+    pub fn text(&self) -> String {
+        let [pipeline, layout, schedule, precision] = &self.variant;
+        let mut text = format!("{pipeline} x {layout} x {schedule} x {precision}\n");
+        let _ = writeln!(text, "{} bytes of state a path\n", self.bytes_per_path);
+        for table in &self.tables {
+            let _ = writeln!(
+                text,
+                "table {}: {} bytes a path, {}, {} words a lane",
+                table.name, table.bytes, table.order, table.lane
+            );
+            text.push_str(&columns(&table_rows(table)));
+            text.push('\n');
+        }
+        text.push_str(&columns(&self.kernel_rows()));
+        for (title, reasons) in [
+            ("dead", &self.dead),
+            ("effects kept", &self.effects.kept),
+            ("effects dropped", &self.effects.dropped),
+        ] {
+            if reasons.is_empty() {
+                continue;
+            }
+            let rows: Vec<Vec<String>> =
+                reasons.iter().map(|row| vec![row.name.clone(), row.reason.clone()]).collect();
+            let _ = write!(text, "\n{title}\n{}", columns(&rows));
+        }
+        text
+    }
+
+    fn kernel_rows(&self) -> Vec<Vec<String>> {
+        let mut rows = vec![["kernel", "loads B", "stores B"].map(str::to_owned).to_vec()];
+        let stages = self.kernels.iter().filter(|kernel| !kernel.stages.is_empty());
+        rows.extend(stages.map(|kernel| {
+            vec![kernel.name.clone(), kernel.load_bytes.to_string(), kernel.store_bytes.to_string()]
+        }));
+        rows
+    }
+
+    /// Everything about a field or one of its leaves, `eye.hit` or `eye.hit.t`; `None` if there is no such field.
+    pub fn field(&self, name: &str) -> Option<String> {
+        let leaves: Vec<&FieldUse> =
+            self.fields.iter().filter(|leaf| leaf.field == name || leaf.leaf == name).collect();
+        let first = leaves.first()?;
+        let words: u32 = leaves.iter().map(|leaf| leaf.words).sum();
+        let mut text = format!("{name}   quantity {}, {words} {}\n", first.quantity, plural(words, "word"));
+        for leaf in &leaves {
+            let indent = if leaves.len() > 1 { "    " } else { "  " };
+            if leaves.len() > 1 {
+                let _ = writeln!(text, "  {}", leaf.leaf);
+            }
+            push_use(&mut text, indent, leaf);
+        }
+        Some(text)
+    }
+
+    /// Names of all fields, `eye.hit`, in the order of declaration.
+    pub fn field_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.fields.iter().map(|leaf| leaf.field.clone()).collect();
+        names.dedup();
+        names
+    }
+}
+
+fn plural(count: u32, noun: &str) -> String {
+    if count == 1 { noun.to_owned() } else { format!("{noun}s") }
+}
+
+fn push_use(text: &mut String, indent: &str, leaf: &FieldUse) {
+    for (verb, stages) in [("written by", &leaf.written), ("read by", &leaf.read)] {
+        let list = if stages.is_empty() { "no stage".to_owned() } else { stages.join(", ") };
+        let _ = writeln!(text, "{indent}{verb} {list}");
+    }
+    if !leaf.live_out.is_empty() {
+        let _ = writeln!(text, "{indent}live out of {}", leaf.live_out.join(", "));
+    }
+    if let Some(stored) = &leaf.stored {
+        let _ = writeln!(text, "{indent}stored in {stored}");
+    }
+    if let Some(reason) = &leaf.dead {
+        let _ = writeln!(text, "{indent}dead: {reason}");
+    }
+}
+
+fn table_rows(table: &TableReport) -> Vec<Vec<String>> {
+    let mut rows = vec![["  field", "codec", "bits", "words", "shift"].map(str::to_owned).to_vec()];
+    rows.extend(table.fields.iter().map(|field| {
+        let words: Vec<String> = field.words.iter().map(u32::to_string).collect();
+        vec![
+            format!("  {}", field.name),
+            field.codec.clone(),
+            field.bits.to_string(),
+            words.join(" "),
+            field.shift.to_string(),
+        ]
+    }));
+    rows
+}
+
+/// Rows with their cells aligned to the left, two blanks between.
+fn columns(rows: &[Vec<String>]) -> String {
+    let count = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
+    let widths: Vec<usize> = (0..count).map(|column| width(column).unwrap_or(0)).collect();
+    let mut text = String::new();
+    for row in rows {
+        let mut line = String::new();
+        for (cell, width) in row.iter().zip(&widths) {
+            let _ = write!(line, "{cell:width$}  ");
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,210 @@
+//! `pathloom render`.
+
+use super::input::{self, DeviceArguments, SceneArguments, VariantArguments};
+use super::summary::Summary;
+use super::{Failure, print, print_json, progress, say};
+use clap::Args;
+use kernelgen::plan::Plan;
+use runtime::error::Error;
+use runtime::film::Sums;
+use runtime::image_file::Image;
+use runtime::picture::{Exposure, to_srgb, write_png};
+use runtime::render::{Rendered, Session, Settings, Until};
+use runtime::scene::Accelerator;
+use runtime::settings::{RenderFile, State};
+use std::path::{Path, PathBuf};
+
+/// Samples per pixel when nothing says when to stop.
+const DEFAULT_SAMPLES: u32 = 64;
+
+/// Without arguments: path tracing of the shipped Cornell box.
+#[derive(Clone, Debug, Args)]
+pub struct Arguments {
+    /// A pipeline (name or .toml file), a render file, or a rendered .exr, whose picture is rendered again
+    #[arg(value_name = "PIPELINE|RENDER.toml|PICTURE.exr", conflicts_with = "resume")]
+    variant: Option<String>,
+    #[command(flatten)]
+    axes: VariantArguments,
+    #[command(flatten)]
+    scene: SceneArguments,
+    #[command(flatten)]
+    device: DeviceArguments,
+    /// Samples per pixel, with --resume those of the picture included
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), group = "until")]
+    spp: Option<u32>,
+    /// Render for this long
+    #[arg(long, value_name = "SECONDS", value_parser = input::positive, group = "until")]
+    time: Option<f64>,
+    /// Render until the root mean square of the standard errors is this part of the mean radiance
+    #[arg(long, value_name = "RELATIVE", value_parser = input::positive, group = "until")]
+    error: Option<f64>,
+    /// Seed of the random numbers; equal seeds give equal samples
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Path slots; more fill larger cards, fewer need less memory
+    #[arg(long, value_name = "N", help_heading = "Device")]
+    paths: Option<u32>,
+    /// Continue a picture where it was stopped
+    #[arg(long, value_name = "PICTURE.exr", conflicts_with_all = ["scene", "camera", "size", "env", "env_scale", "env_rotate", "seed", "set"])]
+    resume: Option<PathBuf>,
+    /// Further layers: `variance` writes standard errors as sem.R, sem.G, sem.B
+    #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
+    aov: Vec<String>,
+    /// Brightness of the PNG in stops, 1 being white; by default the 99th percentile of the luminance is white
+    #[arg(long, value_name = "STOPS", value_parser = input::finite, allow_negative_numbers = true)]
+    exposure: Option<f64>,
+    /// The EXR file to write; the PNG goes beside it
+    #[arg(short, long, value_name = "OUT.exr")]
+    output: Option<PathBuf>,
+    /// Print the time each kernel takes
+    #[arg(long)]
+    profile: bool,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Renders, writes the files, prints the summary.
+///
+/// # Errors
+/// User input, refused variants, failed devices.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let variance = wants_variance(&arguments.aov)?;
+    let earlier = arguments.resume.as_deref().map(input::of_picture).transpose()?;
+    let mut settings = chosen(arguments, earlier.as_ref().map(|(settings, _)| settings))?;
+    let until = until(arguments, &settings);
+    let output = output(arguments, &settings)?;
+
+    let mut scene = input::load_scene(&settings)?;
+    let generated = input::generate_settings(&mut settings, scene.effects.clone())?;
+    let gpu = arguments.device.open()?;
+    scene.set_accelerator(accelerator(&generated.plan));
+    let size = scene.size().into();
+    settings.size = Some(size);
+    let seed = *settings.seed.get_or_insert(0);
+    let render = Settings { size, seed, paths: arguments.paths };
+    let work = match until {
+        Until::Samples(samples) => Some(samples),
+        Until::Seconds(_) | Until::Error(_) => None,
+    };
+    let mut session = Session::new(&gpu, &generated.plan, &|name| scene.resource(name), render, work)?;
+    if let Some((before, image)) = &earlier {
+        resume(&mut session, before, image, until, variance)?;
+    }
+    progress::catch_interrupts()?;
+    let bar = progress::bar();
+    let result = session.run(until, &mut |state| {
+        progress::show(&bar, state);
+        !progress::interrupted()
+    });
+    bar.finish_and_clear();
+    result?;
+
+    let rendered = session.picture()?;
+    let keep_errors = variance || earlier.as_ref().is_some_and(|(_, image)| image.standard_error.is_some());
+    let metadata = metadata(&settings, &rendered, until);
+    let outputs = write(&output, &rendered, &metadata, keep_errors, arguments.exposure)?;
+    if progress::interrupted() {
+        say(&format!("stopped at {} samples per pixel; continue with `pathloom render --resume {}`", rendered.totals.samples, output.display()));
+    }
+    let summary = Summary { rendered: &rendered, generated: &generated, gpu: &gpu, settings: &metadata, outputs: &outputs, profile: arguments.profile };
+    if arguments.json { print_json(&summary.json()?)? } else { print(&summary.text()?)? }
+    Ok(())
+}
+
+/// The hierarchy that the kernels read.
+fn accelerator(plan: &Plan) -> Accelerator {
+    let reads = |name: &str| plan.buffers.iter().any(|buffer| buffer.name == name);
+    if reads("bvh2_nodes") { Accelerator::Bvh2 } else { Accelerator::Cwbvh }
+}
+
+fn wants_variance(layers: &[String]) -> Result<bool, Error> {
+    match layers.iter().find(|layer| *layer != "variance") {
+        Some(other) => Err(Error::input(format!("--aov {other}: there is no such layer")).help("the one layer for now is `variance`")),
+        None => Ok(!layers.is_empty()),
+    }
+}
+
+fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>) -> Result<RenderFile, Error> {
+    let file = match earlier {
+        Some(earlier) => earlier.clone(),
+        None => input::variant(arguments.variant.as_deref())?,
+    };
+    let mut settings = arguments.scene.over(arguments.axes.over(file));
+    settings.seed = arguments.seed.or(settings.seed);
+    Ok(input::with_default_scene(settings.with_defaults()))
+}
+
+fn until(arguments: &Arguments, settings: &RenderFile) -> Until {
+    match (arguments.time, arguments.error) {
+        (Some(seconds), _) => Until::Seconds(seconds),
+        (_, Some(relative)) => Until::Error(relative),
+        _ => Until::Samples(arguments.spp.or(settings.spp).unwrap_or(DEFAULT_SAMPLES)),
+    }
+}
+
+fn output(arguments: &Arguments, settings: &RenderFile) -> Result<PathBuf, Error> {
+    let path = match (&arguments.output, &arguments.resume) {
+        (Some(path), _) | (None, Some(path)) => path.clone(),
+        (None, None) => {
+            let stem = |word: &Option<String>| Path::new(word.as_deref().unwrap_or("")).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            PathBuf::from(format!("{}_{}.exr", stem(&settings.scene), stem(&settings.pipeline)))
+        }
+    };
+    if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("exr")) {
+        return Err(Error::input(format!("the output `{}` is not called .exr", path.display())).help("the PNG is written beside it by itself"));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Err(Error::input(format!("the folder `{}` does not exist", folder.display())));
+    }
+    Ok(path)
+}
+
+fn resume(session: &mut Session, before: &RenderFile, image: &Image, until: Until, variance: bool) -> Result<(), Error> {
+    let state = before.state.ok_or_else(|| Error::input("the picture does not say how many samples it has"))?;
+    if let Until::Samples(wanted) = until
+        && wanted <= state.samples
+    {
+        let error = Error::input(format!("the picture already has {} samples per pixel", state.samples));
+        return Err(error.help(format!("ask for more in total, `--spp {}`", u64::from(state.samples) * 2)));
+    }
+    if image.standard_error.is_none() && (variance || matches!(until, Until::Error(_))) {
+        return Err(Error::input("the picture has no standard errors to continue").help("render it with `--aov variance`"));
+    }
+    session.resume(&image.totals(state.samples, state.batches))
+}
+
+/// The settings as they go into the picture.
+fn metadata(settings: &RenderFile, rendered: &Rendered, until: Until) -> RenderFile {
+    let mut settings = settings.clone();
+    settings.spp = match until {
+        Until::Samples(samples) => Some(samples),
+        Until::Seconds(_) | Until::Error(_) => None,
+    };
+    settings.state = Some(State { samples: rendered.totals.samples, batches: rendered.totals.batches });
+    settings
+}
+
+fn write(path: &Path, rendered: &Rendered, metadata: &RenderFile, errors: bool, exposure: Option<f64>) -> Result<Vec<PathBuf>, Error> {
+    let standard_error = if errors { rendered.standard_error.clone() } else { None };
+    if errors && standard_error.is_none() {
+        super::warn("one sample per pixel gives no standard errors: no `sem` layers are written");
+    }
+    let image = Image {
+        size: rendered.size,
+        radiance: rendered.mean.clone(),
+        standard_error,
+        fixed: match &rendered.totals.sums {
+            Sums::Fixed(units) => Some(units.clone()),
+            Sums::Float(_) => None,
+        },
+        settings: Some(metadata.to_toml()?),
+    };
+    image.save(path)?;
+    let png = path.with_extension("png");
+    let exposure = exposure.map_or(Exposure::Percentile, |stops| Exposure::Stops(stops as f32));
+    write_png(&png, rendered.size, &to_srgb(&rendered.mean, exposure.factor(&rendered.mean)))?;
+    Ok(vec![path.to_path_buf(), png])
+}
+

@@ -1,0 +1,377 @@
+//! Runs a plan: pipelines, the flattened program, passes in flight, counters. Knows no stage and no field by name.
+
+use crate::buffers::Buffers;
+use crate::device::{Gpu, mapped};
+use crate::error::Error;
+use crate::profile::{Profile, Queries};
+use bytemuck::{Pod, Zeroable};
+use kernelgen::plan::{Access, Kernel, Plan, Role, Step};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// Size of the pass uniform.
+pub const PASS_BYTES: u64 = 32;
+/// Widest dispatch in one dimension.
+const WIDEST: u32 = 65_535;
+/// Passes that may be queued on the device at once: one runs, the next is ready, one is being read.
+pub const IN_FLIGHT: usize = 3;
+
+/// The pass uniform, `Role::Pass`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Pass {
+    /// First index into the pixels in tile order.
+    pub first_pixel: u32,
+    /// Sample number of the first slot.
+    pub first_sample: u32,
+    /// Slots in use.
+    pub active: u32,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// Padding.
+    pub unused: [u32; 2],
+}
+
+/// What the kernels counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counters {
+    /// Camera rays.
+    pub primary: u64,
+    /// Rays after the first scattering.
+    pub secondary: u64,
+    /// Later rays of walks.
+    pub deep: u64,
+    /// Shadow and connection rays.
+    pub visibility: u64,
+    /// Contributions refused by the film: not finite, or negative.
+    pub rejected: u64,
+    /// Records that found no room in a stream or queue.
+    pub overflow: u64,
+    /// Paths alive after the last round.
+    pub unfinished: u64,
+}
+
+impl Counters {
+    fn slot(&mut self, name: &str) -> Option<&mut u64> {
+        Some(match name {
+            "rays_primary" => &mut self.primary,
+            "rays_secondary" => &mut self.secondary,
+            "rays_deep" => &mut self.deep,
+            "rays_visibility" => &mut self.visibility,
+            "rejected" => &mut self.rejected,
+            "overflow" => &mut self.overflow,
+            "unfinished" => &mut self.unfinished,
+            _ => return None,
+        })
+    }
+
+    /// Adds another pass.
+    pub fn add(&mut self, other: &Counters) {
+        self.primary += other.primary;
+        self.secondary += other.secondary;
+        self.deep += other.deep;
+        self.visibility += other.visibility;
+        self.rejected += other.rejected;
+        self.overflow += other.overflow;
+        self.unfinished += other.unfinished;
+    }
+}
+
+/// How large a dispatch is.
+#[derive(Clone, Copy, Debug)]
+enum Extent {
+    Active,
+    Single,
+    Indirect(u64),
+}
+
+/// A dispatch of the flattened program.
+#[derive(Clone, Copy, Debug)]
+pub struct Command {
+    /// Index into `Plan::kernels`.
+    pub kernel: usize,
+    /// Round of the outermost loop; 0 outside.
+    pub round: u32,
+    extent: Extent,
+}
+
+#[derive(Debug)]
+struct Pipeline {
+    pipeline: wgpu::ComputePipeline,
+    bindings: wgpu::BindGroup,
+}
+
+#[derive(Debug)]
+struct Flight {
+    submission: wgpu::SubmissionIndex,
+    staging: wgpu::Buffer,
+    profiled: bool,
+}
+
+/// A plan ready to run.
+#[derive(Debug)]
+pub struct Executor {
+    gpu: Gpu,
+    pipelines: Vec<Pipeline>,
+    workgroups: Vec<u32>,
+    program: Vec<Command>,
+    arguments: Option<wgpu::Buffer>,
+    pass: wgpu::Buffer,
+    control: wgpu::Buffer,
+    counters: Vec<(String, u32)>,
+    counted: std::ops::Range<u64>,
+    spare: Vec<wgpu::Buffer>,
+    flying: VecDeque<Flight>,
+    queries: Option<Queries>,
+    /// Times of the passes that were measured.
+    pub profile: Profile,
+}
+
+impl Executor {
+    /// Compiles the kernels, on all cores, and binds the buffers.
+    ///
+    /// # Errors
+    /// Failed, when a kernel does not compile or memory runs out.
+    pub fn new(gpu: &Gpu, plan: &Plan, buffers: &Buffers) -> Result<Self, Error> {
+        let pipelines = plan
+            .kernels
+            .par_iter()
+            .map(|kernel| pipeline(gpu, plan, kernel, buffers))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let mut program = Vec::new();
+        flatten(&plan.program, None, &mut program);
+        let arguments = plan.buffers.iter().position(|buffer| buffer.role == Role::Arguments);
+        let counters: Vec<_> = plan.counters.iter().map(|counter| (counter.name.clone(), counter.word)).collect();
+        let words = counters.iter().map(|(_, word)| u64::from(*word));
+        let counted = words.clone().min().unwrap_or(0) * 4..(words.max().unwrap_or(0) + 1) * 4;
+        let mut executor = Self {
+            gpu: gpu.clone(),
+            pipelines,
+            workgroups: plan.kernels.iter().map(|kernel| kernel.workgroup).collect(),
+            queries: None,
+            profile: Profile::new(plan),
+            program,
+            arguments: arguments.and_then(|index| buffers.all[index].clone()),
+            pass: buffers.of(plan, Role::Pass)?.clone(),
+            control: buffers.of(plan, Role::Control)?.clone(),
+            counters,
+            counted,
+            spare: Vec::new(),
+            flying: VecDeque::new(),
+        };
+        executor.prepare_slots()?;
+        Ok(executor)
+    }
+
+    fn prepare_slots(&mut self) -> Result<(), Error> {
+        for _ in 0..IN_FLIGHT {
+            let description = wgpu::BufferDescriptor {
+                label: Some("counters"),
+                size: self.counted.end - self.counted.start,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            };
+            let staging = self.gpu.scoped("counters", || self.gpu.device.create_buffer(&description))?;
+            self.spare.push(staging);
+        }
+        if self.gpu.has_timestamps() {
+            self.queries = Some(Queries::new(&self.gpu, self.program.len())?);
+        }
+        Ok(())
+    }
+
+    /// Whether another pass may be submitted before one is waited for.
+    pub fn has_room(&self) -> bool {
+        !self.spare.is_empty()
+    }
+
+    /// Passes submitted and not waited for.
+    pub fn in_flight(&self) -> usize {
+        self.flying.len()
+    }
+
+    /// Submits one pass; `after` may encode more behind it. With `measure`, its dispatches are timed, unless another measured
+    /// pass is still in flight or the adapter has no timestamps.
+    ///
+    /// # Errors
+    /// Failed, when no slot is free or the device reported an error.
+    pub fn submit(&mut self, pass: Pass, measure: bool, after: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<(), Error> {
+        let staging = self.spare.pop().ok_or_else(|| Error::failed("no slot is free for another pass"))?;
+        let profiled = measure && self.queries.is_some() && !self.flying.iter().any(|flight| flight.profiled);
+        self.gpu.queue.write_buffer(&self.pass, 0, bytemuck::bytes_of(&pass));
+        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("pass") });
+        self.encode(&mut encoder, pass.active, profiled);
+        let size = self.counted.end - self.counted.start;
+        encoder.copy_buffer_to_buffer(&self.control, self.counted.start, &staging, 0, size);
+        if let Some(queries) = self.queries.as_ref().filter(|_| profiled) {
+            queries.resolve(&mut encoder);
+        }
+        after(&mut encoder);
+        let submission = self.gpu.queue.submit([encoder.finish()]);
+        staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        if let Some(queries) = self.queries.as_ref().filter(|_| profiled) {
+            queries.map();
+        }
+        self.flying.push_back(Flight { submission, staging, profiled });
+        self.gpu.check()
+    }
+
+    fn encode(&self, encoder: &mut wgpu::CommandEncoder, active: u32, profiled: bool) {
+        let queries = self.queries.as_ref().filter(|_| profiled);
+        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("pass"), timestamp_writes: None });
+        if let Some(queries) = queries {
+            queries.stamp(&mut compute, 0);
+        }
+        for (index, command) in self.program.iter().enumerate() {
+            let pipeline = &self.pipelines[command.kernel];
+            compute.set_pipeline(&pipeline.pipeline);
+            compute.set_bind_group(0, &pipeline.bindings, &[]);
+            self.dispatch(&mut compute, command, active);
+            if let Some(queries) = queries {
+                queries.stamp(&mut compute, index + 1);
+            }
+        }
+    }
+
+    fn dispatch(&self, compute: &mut wgpu::ComputePass, command: &Command, active: u32) {
+        match (command.extent, &self.arguments) {
+            (Extent::Indirect(offset), Some(arguments)) => compute.dispatch_workgroups_indirect(arguments, offset),
+            (Extent::Active, _) => {
+                let groups = active.div_ceil(self.workgroups[command.kernel]);
+                compute.dispatch_workgroups(groups.min(WIDEST), groups.div_ceil(WIDEST), 1);
+            }
+            (Extent::Single, _) | (Extent::Indirect(_), None) => compute.dispatch_workgroups(1, 1, 1),
+        }
+    }
+
+    /// Waits for the oldest pass and returns what it counted.
+    ///
+    /// # Errors
+    /// Failed, when the device is lost, a stream overflowed or paths were left unfinished.
+    pub fn wait(&mut self) -> Result<Counters, Error> {
+        let flight = self.flying.pop_front().ok_or_else(|| Error::failed("no pass is in flight"))?;
+        self.gpu.wait(flight.submission)?;
+        let bytes = mapped(&flight.staging, self.counted.end - self.counted.start)?;
+        self.spare.push(flight.staging);
+        let counters = self.counted_in(&bytes);
+        if let Some(queries) = self.queries.as_ref().filter(|_| flight.profiled) {
+            let times = queries.read(&self.gpu)?;
+            self.profile.add(&self.program, &times, &counters);
+        }
+        refuse_losses(&counters)?;
+        Ok(counters)
+    }
+
+    fn counted_in(&self, bytes: &[u8]) -> Counters {
+        let mut counters = Counters::default();
+        for (name, word) in &self.counters {
+            let at = (u64::from(*word) * 4 - self.counted.start) as usize;
+            let value: u32 = bytemuck::pod_read_unaligned(&bytes[at..at + 4]);
+            if let Some(slot) = counters.slot(name) {
+                *slot += u64::from(value);
+            }
+        }
+        counters
+    }
+}
+
+fn refuse_losses(counters: &Counters) -> Result<(), Error> {
+    if counters.overflow > 0 {
+        let lost = counters.overflow;
+        return Err(Error::failed(format!("a stream overflowed: {lost} records were lost in one pass, so the picture would be wrong")));
+    }
+    if counters.unfinished > 0 {
+        let left = counters.unfinished;
+        return Err(Error::failed(format!("{left} paths were still alive after the last round: the pipeline's `rounds` is too small")));
+    }
+    Ok(())
+}
+
+fn flatten(steps: &[Step], round: Option<u32>, program: &mut Vec<Command>) {
+    for step in steps {
+        let command = |kernel: usize, extent| Command { kernel, round: round.unwrap_or(0), extent };
+        match step {
+            Step::Dispatch { kernel } => program.push(command(*kernel, Extent::Active)),
+            Step::Single { kernel } => program.push(command(*kernel, Extent::Single)),
+            Step::Indirect { kernel, slot } => program.push(command(*kernel, Extent::Indirect(u64::from(*slot) * 12))),
+            Step::Loop { rounds, body } => {
+                for index in 0..*rounds {
+                    flatten(body, round.or(Some(index)), program);
+                }
+            }
+        }
+    }
+}
+
+fn pipeline(gpu: &Gpu, plan: &Plan, kernel: &Kernel, buffers: &Buffers) -> Result<Pipeline, Error> {
+    let name = kernel.name.as_str();
+    let module = gpu.module(name, &kernel.module)?;
+    let layout = bind_group_layout(gpu, kernel)?;
+    let bindings = bind_group(gpu, plan, kernel, buffers, &layout)?;
+    let constants = [("path_count", f64::from(buffers.path_count))];
+    let pipeline = gpu.scoped(name, || {
+        let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(name),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(name),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(&kernel.entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: if kernel.uses_path_count { &constants } else { &[] },
+                ..Default::default()
+            },
+            cache: None,
+        })
+    })?;
+    Ok(Pipeline { pipeline, bindings })
+}
+
+fn bind_group_layout(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::BindGroupLayout, Error> {
+    let most = gpu.device.limits().max_storage_buffers_per_shader_stage as usize;
+    let storage = kernel.bindings.iter().filter(|binding| binding.access != Access::Uniform).count();
+    if storage > most {
+        let (name, adapter) = (&kernel.name, &gpu.info.name);
+        return Err(Error::input(format!("the kernel `{name}` binds {storage} storage buffers, but the adapter `{adapter}` allows {most}")));
+    }
+    let entries: Vec<_> = kernel
+        .bindings
+        .iter()
+        .map(|binding| wgpu::BindGroupLayoutEntry {
+            binding: binding.binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer { ty: binding_type(binding.access), has_dynamic_offset: false, min_binding_size: None },
+            count: None,
+        })
+        .collect();
+    let description = wgpu::BindGroupLayoutDescriptor { label: Some(&kernel.name), entries: &entries };
+    gpu.scoped(&kernel.name, || gpu.device.create_bind_group_layout(&description))
+}
+
+fn binding_type(access: Access) -> wgpu::BufferBindingType {
+    match access {
+        Access::Uniform => wgpu::BufferBindingType::Uniform,
+        Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
+        Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+    }
+}
+
+fn bind_group(gpu: &Gpu, plan: &Plan, kernel: &Kernel, buffers: &Buffers, layout: &wgpu::BindGroupLayout) -> Result<wgpu::BindGroup, Error> {
+    let mut entries = Vec::with_capacity(kernel.bindings.len());
+    for binding in &kernel.bindings {
+        let name = plan.buffers.get(binding.buffer).map_or("?", |buffer| buffer.name.as_str());
+        let buffer = buffers.all.get(binding.buffer).and_then(Option::as_ref);
+        let buffer = buffer.ok_or_else(|| Error::failed(format!("the kernel `{}` binds `{name}`, which was not allocated", kernel.name)))?;
+        entries.push(wgpu::BindGroupEntry { binding: binding.binding, resource: buffer.as_entire_binding() });
+    }
+    let description = wgpu::BindGroupDescriptor { label: Some(&kernel.name), layout, entries: &entries };
+    gpu.scoped(&kernel.name, || gpu.device.create_bind_group(&description))
+}

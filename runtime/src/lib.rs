@@ -1,0 +1,15 @@
+//! Executes a generated plan over a scene: device, buffers, passes, film, files. Knows no stage and no field by name.
+
+pub mod buffers;
+pub mod compare;
+pub mod configs;
+pub mod device;
+pub mod error;
+pub mod execute;
+pub mod film;
+pub mod image_file;
+pub mod picture;
+pub mod profile;
+pub mod render;
+pub mod scene;
+pub mod settings;

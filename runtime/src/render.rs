@@ -1,0 +1,329 @@
+//! A render from plan to picture: splits pixels x samples into passes and batches, keeps passes in flight, adds up what they count.
+
+use crate::buffers::{Buffers, Resources, choose_path_count};
+use crate::device::Gpu;
+use crate::error::Error;
+use crate::execute::{Counters, Executor, IN_FLIGHT, Pass};
+use crate::film::{Accumulator, Totals};
+use crate::profile::Profile;
+use kernelgen::plan::{Plan, Role};
+use std::time::Instant;
+
+/// Passes are cut so that one takes about this long, s: drivers and Ctrl-C get their turn.
+const PASS_SECONDS: f64 = 0.5;
+/// A pass is never cut below this many slots.
+const SMALLEST_PASS: u32 = 16_384;
+/// A render of known length is cut into at least this many batches, for standard errors.
+const FEWEST_BATCHES: u32 = 8;
+/// The first pass warms up; every pass up to this one is measured, and then every so many-th.
+const MEASURED_FIRST: u64 = 8;
+const MEASURED_EVERY: u64 = 16;
+/// How often the error is looked at when rendering until it is small, s.
+const ERROR_SECONDS: f64 = 1.0;
+
+/// What is rendered, besides the plan and the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Seed of the random numbers; equal seeds give equal samples.
+    pub seed: u32,
+    /// Path slots; the adapter's default when `None`.
+    pub paths: Option<u32>,
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Until {
+    /// At this many samples per pixel in total, earlier runs included.
+    Samples(u32),
+    /// After this many seconds of rendering, at the next whole sample.
+    Seconds(f64),
+    /// When the relative error (see `Totals::relative_error`) is at most this.
+    Error(f64),
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Samples (pixels x samples per pixel) taken since the session began.
+    pub taken: u64,
+    /// Samples per second so far.
+    pub per_second: f64,
+    /// Part of the work done, 0 to 1, when it is known.
+    pub part: Option<f64>,
+}
+
+/// A finished picture, or one that was stopped early.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Everything accumulated, also by earlier runs.
+    pub totals: Totals,
+    /// Mean radiance, three channels a pixel, row by row from the top, W m^-2 sr^-1.
+    pub mean: Vec<f32>,
+    /// Its standard error; `None` before the second batch.
+    pub standard_error: Option<Vec<f32>>,
+    /// Samples per pixel taken by this run.
+    pub samples_taken: u32,
+    /// Counts of this run.
+    pub counters: Counters,
+    /// Seconds of rendering, compilation and loading left out.
+    pub seconds: f64,
+    /// Device times.
+    pub profile: Profile,
+}
+
+/// A render in progress.
+#[derive(Debug)]
+pub struct Session {
+    gpu: Gpu,
+    executor: Executor,
+    accumulator: Accumulator,
+    settings: Settings,
+    path_count: u32,
+    pass_limit: u32,
+    samples: u32,
+    batches: u32,
+    spread_known: bool,
+    samples_before: u32,
+    passes: u64,
+    taken: u64,
+    counters: Counters,
+    seconds: f64,
+    sizes: std::collections::VecDeque<u32>,
+}
+
+impl Session {
+    /// Allocates, uploads and compiles. `work` is the number of samples per pixel to come, where it is known: fewer slots may do.
+    ///
+    /// # Errors
+    /// User input when the adapter cannot run the plan or the picture does not fit; failed when a kernel does not compile.
+    pub fn new(gpu: &Gpu, plan: &Plan, resources: &Resources, settings: Settings, work: Option<u32>) -> Result<Self, Error> {
+        gpu.require(&plan.needs)?;
+        let pixels = pixels_of(settings.size)?;
+        let total = work.map(|samples| u64::from(samples) * u64::from(pixels));
+        let path_count = choose_path_count(gpu, plan, pixels.into(), settings.paths, total)?;
+        let buffers = Buffers::new(gpu, plan, pixels.into(), path_count, resources)?;
+        let accumulator = Accumulator::new(gpu, plan.film, pixels.into(), buffers.of(plan, Role::Film)?)?;
+        let executor = Executor::new(gpu, plan, &buffers)?;
+        gpu.check()?;
+        Ok(Self {
+            gpu: gpu.clone(),
+            executor,
+            accumulator,
+            settings,
+            path_count,
+            pass_limit: path_count,
+            samples: 0,
+            batches: 0,
+            spread_known: true,
+            samples_before: 0,
+            passes: 0,
+            taken: 0,
+            counters: Counters::default(),
+            seconds: 0.0,
+            sizes: std::collections::VecDeque::new(),
+        })
+    }
+
+    /// Path slots.
+    pub fn path_count(&self) -> u32 {
+        self.path_count
+    }
+
+    /// Continues an earlier render: its samples are neither lost nor taken again. Call before `run`.
+    ///
+    /// # Errors
+    /// User input, when its size differs.
+    pub fn resume(&mut self, totals: &Totals) -> Result<(), Error> {
+        self.accumulator.write(&self.gpu, totals)?;
+        self.samples = totals.samples;
+        self.samples_before = totals.samples;
+        self.batches = totals.batches;
+        self.spread_known = totals.spread.is_some();
+        Ok(())
+    }
+
+    /// Renders until told, or until `watch` returns false; always whole samples of the whole picture.
+    ///
+    /// # Errors
+    /// Failed, when the device is lost, a stream overflowed or paths were left unfinished.
+    pub fn run(&mut self, until: Until, watch: &mut dyn FnMut(&Progress) -> bool) -> Result<(), Error> {
+        let start = Instant::now();
+        let before = self.seconds;
+        let mut stop = false;
+        let mut looked = Instant::now();
+        while !stop && !self.reached(until, before + start.elapsed().as_secs_f64()) {
+            let samples = self.batch_samples(until);
+            self.run_batch(samples, start, &mut |session, elapsed| {
+                let go_on = watch(&session.progress(until, before + elapsed, elapsed));
+                stop |= !go_on;
+            })?;
+            if let Until::Error(wanted) = until
+                && self.batches >= FEWEST_BATCHES
+                && looked.elapsed().as_secs_f64() > ERROR_SECONDS
+            {
+                stop |= self.totals()?.relative_error() <= wanted;
+                looked = Instant::now();
+            }
+        }
+        while self.executor.in_flight() > 0 {
+            self.finish_pass()?;
+        }
+        self.seconds = before + start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    fn reached(&self, until: Until, elapsed: f64) -> bool {
+        match until {
+            Until::Samples(wanted) => self.samples >= wanted,
+            Until::Seconds(wanted) => self.batches > 0 && elapsed + self.flying_seconds(elapsed) >= wanted,
+            Until::Error(_) => false,
+        }
+    }
+
+    /// The time that the passes in flight are going to take, at the speed so far, s.
+    fn flying_seconds(&self, elapsed: f64) -> f64 {
+        let done = self.taken as f64;
+        let flying: f64 = self.sizes.iter().map(|&size| f64::from(size)).sum();
+        if done > 0.0 { elapsed * flying / done } else { 0.0 }
+    }
+
+    /// Samples per pixel of the next batch: a pass of whole samples at most, and an eighth of the work at most.
+    fn batch_samples(&self, until: Until) -> u32 {
+        let pixels = self.settings.size[0] * self.settings.size[1];
+        let natural = (self.path_count / pixels).max(1);
+        match until {
+            Until::Samples(wanted) => {
+                let run = wanted - self.samples_before.min(wanted);
+                natural.min((run / FEWEST_BATCHES).max(1)).min(wanted - self.samples)
+            }
+            Until::Seconds(_) | Until::Error(_) => natural.min((self.samples / FEWEST_BATCHES).max(1)),
+        }
+    }
+
+    fn run_batch(&mut self, samples: u32, start: Instant, after_pass: &mut dyn FnMut(&Self, f64)) -> Result<(), Error> {
+        let pixels = self.settings.size[0] * self.settings.size[1];
+        let work = u64::from(pixels) * u64::from(samples);
+        let mut done = 0;
+        while done < work {
+            if !self.executor.has_room() || self.executor.in_flight() >= IN_FLIGHT {
+                let before = Instant::now();
+                let active = self.finish_pass()?;
+                self.pace(active, before.elapsed().as_secs_f64());
+                after_pass(self, start.elapsed().as_secs_f64());
+            }
+            let active = u64::from(self.pass_limit).min(work - done) as u32;
+            let last = done + u64::from(active) == work;
+            self.submit(done, active, last.then_some(samples))?;
+            done += u64::from(active);
+        }
+        self.samples += samples;
+        self.batches += 1;
+        Ok(())
+    }
+
+    /// Submits the pass that begins `done` slots into the current batch, and ends the batch behind it if `ends` says of how many samples.
+    fn submit(&mut self, done: u64, active: u32, ends: Option<u32>) -> Result<(), Error> {
+        let [width, height] = self.settings.size;
+        let pixels = u64::from(width) * u64::from(height);
+        let pass = Pass {
+            first_pixel: (done % pixels) as u32,
+            first_sample: self.samples + (done / pixels) as u32,
+            active,
+            width,
+            height,
+            seed: self.settings.seed,
+            unused: [0; 2],
+        };
+        let number = self.passes;
+        let measure = (1..=MEASURED_FIRST).contains(&number) || number % MEASURED_EVERY == 0;
+        let (gpu, accumulator, samples) = (&self.gpu, &self.accumulator, self.samples);
+        self.executor.submit(pass, measure, |encoder| {
+            if let Some(batch) = ends {
+                accumulator.encode(gpu, encoder, batch, samples);
+            }
+        })?;
+        self.passes += 1;
+        self.sizes.push_back(active);
+        Ok(())
+    }
+
+    /// Waits for the oldest pass and returns how many slots it had.
+    fn finish_pass(&mut self) -> Result<u32, Error> {
+        let counters = self.executor.wait()?;
+        self.counters.add(&counters);
+        let active = self.sizes.pop_front().unwrap_or(0);
+        self.taken += u64::from(active);
+        Ok(active)
+    }
+
+    /// Shortens passes on slow devices. With the queue full, the wait for a pass is about the time it took.
+    fn pace(&mut self, active: u32, seconds: f64) {
+        if seconds > PASS_SECONDS && active >= self.pass_limit {
+            let shorter = (f64::from(active) * PASS_SECONDS / seconds) as u32;
+            self.pass_limit = (shorter / 1024 * 1024).max(SMALLEST_PASS).min(self.path_count);
+        }
+    }
+
+    fn progress(&self, until: Until, elapsed: f64, run: f64) -> Progress {
+        let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
+        let part = match until {
+            Until::Samples(wanted) => Some(self.taken as f64 / (pixels * f64::from(wanted - self.samples_before.min(wanted)).max(1.0))),
+            Until::Seconds(wanted) => Some(run / wanted),
+            Until::Error(_) => None,
+        };
+        Progress { taken: self.taken, per_second: self.taken as f64 / elapsed.max(1e-9), part: part.map(|part| part.min(1.0)) }
+    }
+
+    /// Reads what has been accumulated.
+    ///
+    /// # Errors
+    /// Failed, when the device is lost.
+    pub fn totals(&self) -> Result<Totals, Error> {
+        let mut totals = self.accumulator.read(&self.gpu, self.samples, self.batches)?;
+        if !self.spread_known {
+            totals.spread = None;
+        }
+        Ok(totals)
+    }
+
+    /// Reads the picture; more may be rendered afterwards.
+    ///
+    /// # Errors
+    /// Failed, when the device is lost.
+    pub fn picture(&self) -> Result<Rendered, Error> {
+        let totals = self.totals()?;
+        Ok(Rendered {
+            size: self.settings.size,
+            mean: totals.mean(),
+            standard_error: totals.standard_error(),
+            totals,
+            samples_taken: self.samples - self.samples_before,
+            counters: self.counters,
+            seconds: self.seconds,
+            profile: self.executor.profile.clone(),
+        })
+    }
+}
+
+/// Renders a plan in one call: for tests and studies.
+///
+/// # Errors
+/// As `Session::new` and `Session::run`.
+pub fn render(gpu: &Gpu, plan: &Plan, resources: &Resources, settings: Settings, samples: u32) -> Result<Rendered, Error> {
+    let mut session = Session::new(gpu, plan, resources, settings, Some(samples))?;
+    session.run(Until::Samples(samples), &mut |_| true)?;
+    session.picture()
+}
+
+fn pixels_of(size: [u32; 2]) -> Result<u32, Error> {
+    let [width, height] = size;
+    let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0 && pixels <= u32::MAX / 3);
+    pixels.ok_or_else(|| Error::input(format!("a picture of {width}x{height} pixels is empty or too large")))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,246 @@
+//! The settings of a render, as they stand in `configs/renders/*.toml` and in the metadata of a picture.
+
+use crate::configs::{Axis, Library};
+use crate::error::Error;
+use indexmap::IndexMap;
+use kernelgen::config::model::{Effects, Selection};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Everything that fixes a picture; every key is optional.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RenderFile {
+    /// One line about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doc: Option<String>,
+    /// Name or file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pipeline: Option<String>,
+    /// Name or file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layout: Option<String>,
+    /// Name or file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub schedule: Option<String>,
+    /// Name or file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub precision: Option<String>,
+    /// Name, file or folder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
+    /// Name or index of a camera of the scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Camera>,
+    /// Width and height in pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
+    /// Samples per pixel.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spp: Option<u32>,
+    /// Seed of the random numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u32>,
+    /// Sky picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub env: Option<String>,
+    /// Factor on its radiance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub env_scale: Option<f64>,
+    /// Its turn about +Y, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub env_rotate: Option<f64>,
+    /// `--set` values.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub set: IndexMap<String, SetValue>,
+    /// How far a saved picture is; absent in render files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state: Option<State>,
+    /// Texts of the configs that do not come with the program, by key; absent in render files.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub files: IndexMap<String, String>,
+}
+
+/// How a camera is chosen.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Camera {
+    /// By its place in the file.
+    Index(u32),
+    /// By its name.
+    Name(String),
+}
+
+impl Camera {
+    /// The word for the command line.
+    pub fn word(&self) -> String {
+        match self {
+            Camera::Index(index) => index.to_string(),
+            Camera::Name(name) => name.clone(),
+        }
+    }
+}
+
+/// The value of a `--set`, with or without quotes in TOML.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum SetValue {
+    /// `true`
+    Bool(bool),
+    /// `8`
+    Integer(i64),
+    /// `0.5`
+    Float(f64),
+    /// `"fixed_i64"`
+    Text(String),
+}
+
+impl SetValue {
+    fn word(&self) -> String {
+        match self {
+            SetValue::Bool(value) => value.to_string(),
+            SetValue::Integer(value) => value.to_string(),
+            SetValue::Float(value) => value.to_string(),
+            SetValue::Text(value) => value.clone(),
+        }
+    }
+}
+
+/// How far a saved picture is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct State {
+    /// Samples per pixel in it.
+    pub samples: u32,
+    /// Batches they came in.
+    pub batches: u32,
+}
+
+impl RenderFile {
+    /// Reads the text of a render file.
+    ///
+    /// # Errors
+    /// User input, with the place in the text.
+    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+        toml::from_str(text).map_err(|error| Error::input(error.to_string().trim_end()).in_file(name))
+    }
+
+    /// Makes relative files of a render file count from its folder, where they exist there.
+    pub fn relative_to(&mut self, folder: &Path) {
+        let words = [&mut self.pipeline, &mut self.layout, &mut self.schedule, &mut self.precision, &mut self.scene, &mut self.env];
+        for word in words.into_iter().flatten() {
+            let beside = folder.join(word.as_str());
+            if beside.is_file() {
+                *word = beside.to_string_lossy().into_owned();
+            }
+        }
+    }
+
+    /// The settings with those of `over` on top; `set` values are merged.
+    #[must_use]
+    pub fn overlaid(mut self, over: Self) -> Self {
+        let mut set = std::mem::take(&mut self.set);
+        set.extend(over.set);
+        let mut files = std::mem::take(&mut self.files);
+        files.extend(over.files);
+        Self {
+            doc: over.doc.or(self.doc),
+            pipeline: over.pipeline.or(self.pipeline),
+            layout: over.layout.or(self.layout),
+            schedule: over.schedule.or(self.schedule),
+            precision: over.precision.or(self.precision),
+            scene: over.scene.or(self.scene),
+            camera: over.camera.or(self.camera),
+            size: over.size.or(self.size),
+            spp: over.spp.or(self.spp),
+            seed: over.seed.or(self.seed),
+            env: over.env.or(self.env),
+            env_scale: over.env_scale.or(self.env_scale),
+            env_rotate: over.env_rotate.or(self.env_rotate),
+            set,
+            state: over.state.or(self.state),
+            files,
+        }
+    }
+
+    /// Fills in what was not chosen: path tracing, structure of arrays, wavefront, f32.
+    #[must_use]
+    pub fn with_defaults(self) -> Self {
+        Self {
+            pipeline: Some("pt".to_owned()),
+            layout: Some("soa".to_owned()),
+            schedule: Some("wavefront".to_owned()),
+            precision: Some("f32".to_owned()),
+            ..Self::default()
+        }
+        .overlaid(self)
+    }
+
+    /// Resolves the axes to config keys; reads the user's own files into `library`.
+    ///
+    /// # Errors
+    /// User input, when an axis is not chosen, or names what does not exist.
+    pub fn selection(&self, library: &mut Library, effects: Effects) -> Result<Selection, Error> {
+        for (key, text) in &self.files {
+            library.add_own(key, text);
+        }
+        let mut key = |axis: Axis, word: &Option<String>| match word {
+            Some(word) => library.resolve(axis, word),
+            None => Err(Error::input(format!("no {} is chosen", axis.word()))),
+        };
+        Ok(Selection {
+            pipeline: key(Axis::Pipeline, &self.pipeline)?,
+            layout: key(Axis::Layout, &self.layout)?,
+            schedule: key(Axis::Schedule, &self.schedule)?,
+            precision: key(Axis::Precision, &self.precision)?,
+            set: self.set.iter().map(|(key, value)| (key.clone(), value.word())).collect(),
+            effects,
+        })
+    }
+
+    /// As TOML, for the metadata of a picture.
+    ///
+    /// # Errors
+    /// Failed, when a value has no TOML form.
+    pub fn to_toml(&self) -> Result<String, Error> {
+        toml::to_string_pretty(self).map_err(|error| Error::failed(format!("cannot write the settings as TOML: {error}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_win_and_sets_merge() {
+        let file = RenderFile::parse("pipeline = \"pt\"\nsize = [4, 2]\ncamera = 1\nset = { max_edges = 5, rr = true }", "a.toml");
+        let over = RenderFile {
+            size: Some([8, 8]),
+            set: IndexMap::from([("max_edges".to_owned(), SetValue::Text("9".to_owned()))]),
+            ..RenderFile::default()
+        };
+        let merged = file.map(|file| file.overlaid(over)).unwrap_or_default();
+        assert_eq!((merged.size, merged.pipeline.as_deref()), (Some([8, 8]), Some("pt")));
+        assert_eq!(merged.camera, Some(Camera::Index(1)));
+        assert_eq!(merged.set.values().map(SetValue::word).collect::<Vec<_>>(), ["9", "true"]);
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_with_their_place() {
+        let error = RenderFile::parse("sise = [4, 2]", "a.toml");
+        assert!(error.is_err_and(|error| error.exit_code() == 2 && error.to_string().contains("sise")));
+    }
+
+    #[test]
+    fn metadata_can_be_read_back() {
+        let settings = RenderFile {
+            spp: Some(16),
+            state: Some(State { samples: 16, batches: 8 }),
+            files: IndexMap::from([("pipelines/mine.toml".to_owned(), "start = \"a\"\n".to_owned())]),
+            set: IndexMap::from([("schedule.workgroup".to_owned(), SetValue::Text("128".to_owned()))]),
+            ..RenderFile::default()
+        };
+        let again = settings.to_toml().and_then(|text| RenderFile::parse(&text, "metadata"));
+        assert_eq!(again.ok(), Some(settings));
+    }
+}

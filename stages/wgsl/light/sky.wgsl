@@ -1,0 +1,116 @@
+//! The environment: radiance from infinity, in a latitude-longitude table.
+
+import package::real::{real, vec2r, vec3r, vec4r};
+import package::math::constants::{INVERSE_PI, INVERSE_TWO_PI, PI, TWO_PI};
+import package::math::elementary::{arc_tangent2, cosine, sine};
+import package::scene::scene;
+import package::surface::surface::Surface;
+import package::light::table::pick_probability;
+import package::light::light_sample::LightSample;
+import package::light::emission_sample::Emission;
+import package::light::directional_light::{origin_at_infinity, pdf_disk, segment_to_infinity};
+
+/// Radiance in W/(m2 sr), and the density of sampled directions times sin(theta), per sr.
+var<storage, read> sky_texels: array<vec4f>;
+/// Per texel: bits of the alias threshold, alias.
+var<storage, read> sky_alias: array<vec2u>;
+
+/// A direction into the sky and the place of it in the table.
+struct SkyPoint {
+    /// Unit, world, away from the scene.
+    direction: vec3r,
+    /// In [0,1]: azimuth and polar angle, row 0 at the zenith.
+    uv: vec2r,
+    /// sin(theta).
+    sine_polar: real,
+}
+
+/// Table coordinates of a unit direction. The polar angle comes from both coordinates, exact near the poles.
+fn sky_point(direction: vec3r) -> SkyPoint {
+    let turn = vec2r(scene.sky_rotation.xy);
+    let x = direction.x * turn.x - direction.z * turn.y;
+    let z = direction.x * turn.y + direction.z * turn.x;
+    var point: SkyPoint;
+    point.direction = direction;
+    point.sine_polar = length(vec2r(x, z));
+    let azimuth = arc_tangent2(x, -z) * INVERSE_TWO_PI;
+    point.uv = vec2r(azimuth - floor(azimuth), arc_tangent2(point.sine_polar, direction.y) * INVERSE_PI);
+    return point;
+}
+
+/// The direction that table coordinates stand for: the inverse of `sky_point`.
+fn sky_point_at(uv: vec2r) -> SkyPoint {
+    let turn = vec2r(scene.sky_rotation.xy);
+    var point: SkyPoint;
+    point.uv = uv;
+    point.sine_polar = sine(PI * uv.y);
+    let x = point.sine_polar * sine(TWO_PI * uv.x);
+    let z = -point.sine_polar * cosine(TWO_PI * uv.x);
+    point.direction = vec3r(x * turn.x + z * turn.y, cosine(PI * uv.y), z * turn.x - x * turn.y);
+    return point;
+}
+
+/// Texel of the table that holds the coordinates.
+fn sky_texel(uv: vec2r) -> u32 {
+    let size = scene.sky.xy;
+    let texel = min(vec2u(uv * vec2r(size)), size - vec2u(1u));
+    return texel.y * size.x + texel.x;
+}
+
+/// Radiance of the sky, bilinear between texel centres, periodic in azimuth.
+fn sky_radiance_at(uv: vec2r) -> vec3r {
+    let size = vec2i(scene.sky.xy);
+    let place = uv * vec2r(size) - vec2r(0.5);
+    let base = floor(place);
+    let blend = place - base;
+    let corner = vec2i(base);
+    let column = vec2i((corner.x + size.x) % size.x, (corner.x + 1) % size.x);
+    let row = clamp(vec2i(corner.y, corner.y + 1) , vec2i(0), vec2i(size.y - 1)) * size.x;
+    let upper = mix(vec3r(sky_texels[row.x + column.x].xyz), vec3r(sky_texels[row.x + column.y].xyz), blend.x);
+    let lower = mix(vec3r(sky_texels[row.y + column.x].xyz), vec3r(sky_texels[row.y + column.y].xyz), blend.x);
+    return mix(upper, lower, blend.y);
+}
+
+/// Radiance that arrives from a unit direction, W/(m2 sr).
+fn sky_radiance(direction: vec3r) -> vec3r {
+    return sky_radiance_at(sky_point(direction).uv);
+}
+
+/// Density with which `sample_light` draws this direction as one of the sky, pick probability included, per sr.
+fn sky_pdf_w(direction: vec3r) -> real {
+    let point = sky_point(direction);
+    return real(scene.sky_rotation.z) * real(sky_texels[sky_texel(point.uv)].w) / point.sine_polar;
+}
+
+/// A direction in proportion to radiance: `random` places it in a texel, `texel` picks that (row, column, threshold).
+fn sample_sky_point(random: vec2r, texel: vec4r) -> SkyPoint {
+    let size = scene.sky.xy;
+    let slot = min(vec2u(texel.yx * vec2r(size)), size - vec2u(1u));
+    let index = slot.y * size.x + slot.x;
+    let entry = sky_alias[index];
+    let picked = select(entry.y, index, texel.z < real(bitcast<f32>(entry.x)));
+    return sky_point_at((vec2r(vec2u(picked % size.x, picked / size.x)) + random) / vec2r(size));
+}
+
+/// Light from a direction of the sky.
+fn sample_sky(light: u32, receiver: Surface, random: vec2r, texel: vec4r) -> LightSample {
+    let point = sample_sky_point(random, texel);
+    var sample: LightSample;
+    sample.direction = point.direction;
+    sample.radiance = sky_radiance_at(point.uv);
+    sample.density = pick_probability(light) * real(sky_texels[sky_texel(point.uv)].w);
+    sample.cosine = point.sine_polar;
+    sample.segment = segment_to_infinity(receiver, sample.direction);
+    return sample;
+}
+
+/// A ray of light out of the sky: throughput = L / (p_env p_disk).
+fn emit_sky(light: u32, random: vec2r, direction: vec4r, texel: vec4r) -> Emission {
+    let point = sample_sky_point(random, texel);
+    let density = pick_probability(light) * real(sky_texels[sky_texel(point.uv)].w) * pdf_disk();
+    var emission: Emission;
+    emission.direction = -point.direction;
+    emission.origin = origin_at_infinity(emission.direction, direction.xy);
+    emission.throughput = sky_radiance_at(point.uv) * (point.sine_polar / density);
+    return emission;
+}

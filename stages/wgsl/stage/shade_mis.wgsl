@@ -1,0 +1,52 @@
+import package::real::real;
+import package::state::{Path, Walk};
+import package::outcome::{ABSORBED, SCATTERED};
+import package::params::max_edges;
+import package::features::{HAS_AREA_LIGHT, HAS_DELTA, HAS_DIRECTIONAL_LIGHT, HAS_POINT_LIGHT, HAS_SKY, HAS_SPOT_LIGHT};
+import package::film::splat;
+import package::pass::path_pixel;
+import package::random::{DIMENSION_SCATTER, WALK_EYE, random4};
+import package::surface::material::{emission_at, is_emissive, material_at};
+import package::bsdf::bsdf::{RADIANCE, bsdf_at, eval_bsdf, is_connectable, sample_bsdf};
+import package::light::light::emitter_pdf_w;
+import package::transport::direct::{direct_light, offer_direct_light};
+import package::transport::mis::{hit_weight, weighted_inverse_light_pdf};
+import package::transport::walk::{arrive, depart, is_absorbed};
+
+/// Vertex s = `path.length` of a path tracer's eye walk: adds emission it ran into (path of s edges), samples a light
+/// (s + 1 edges) and scatters, the two strategies weighted against each other.
+fn shade_mis(walk: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
+    path.length += 1u;
+    let surface = arrive(walk);
+    if HAS_AREA_LIGHT {
+        if is_emissive(surface) {
+            var weight = real(1.0);
+            if walk.pdf_w > 0.0 {
+                weight = hit_weight(walk.pdf_w, emitter_pdf_w(surface, walk.direction, walk.hit.t));
+            }
+            splat(path_pixel(), walk.throughput * emission_at(surface) * weight);
+        }
+    }
+    if path.length >= max_edges {
+        return ABSORBED;
+    }
+    let outgoing = -walk.direction;
+    let bsdf = bsdf_at(surface, material_at(surface), outgoing);
+    if HAS_AREA_LIGHT || HAS_POINT_LIGHT || HAS_SPOT_LIGHT || HAS_DIRECTIONAL_LIGHT || HAS_SKY {
+        if is_connectable(bsdf) {
+            let light = direct_light(surface, path.length);
+            let scattered = eval_bsdf(bsdf, outgoing, light.direction, RADIANCE);
+            offer_direct_light(walk, surface, light, scattered.value, weighted_inverse_light_pdf(light, scattered.pdf));
+        }
+    }
+    let sample = sample_bsdf(bsdf, outgoing, random4(WALK_EYE, path.length, DIMENSION_SCATTER).xyz, RADIANCE);
+    if is_absorbed(sample) {
+        return ABSORBED;
+    }
+    depart(walk, surface, sample);
+    walk.pdf_w = sample.pdf;
+    if HAS_DELTA {
+        walk.pdf_w = select(sample.pdf, 0.0, sample.delta);
+    }
+    return SCATTERED;
+}

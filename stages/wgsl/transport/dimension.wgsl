@@ -1,0 +1,29 @@
+//! Which random numbers are for what: `random4(walk, vertex, dimension)`. Vertices count from the camera (0) on eye walks
+//! and from the emitter (1) on light walks; the two walks never share a number.
+//!
+//! | walk, vertex           | dimension            | x, y                          | z, w                        |
+//! |------------------------|----------------------|-------------------------------|-----------------------------|
+//! | any, surface           | DIMENSION_SCATTER    | direction                     | lobe, -                     |
+//! | eye, surface           | DIMENSION_LIGHT      | place on the light            | choice of the light         |
+//! | eye, surface           | DIMENSION_SKY        | row, column of the sky's texel | threshold, -               |
+//! | eye, camera            | DIMENSION_EMIT       | raster                        | lens                        |
+//! | light, emitter         | DIMENSION_EMIT       | place on the light            | choice of the light         |
+//! | light, emitter         | DIMENSION_DIRECTION  | direction, or place on the disk | side of a triangle, -     |
+//! | light, emitter         | DIMENSION_SKY        | row, column of the sky's texel | threshold, -               |
+//! | light, surface         | DIMENSION_CHOICE     | lens                          | -, -                        |
+
+import package::real::vec4r;
+import package::features::HAS_SKY;
+import package::random::random4;
+
+const DIMENSION_SKY: u32 = 4u;
+const DIMENSION_DIRECTION: u32 = 5u;
+
+/// The numbers that pick a texel of the sky; zero, and not drawn, in scenes without one.
+fn random_texel(walk: u32, vertex: u32) -> vec4r {
+    var texel = vec4r(0.0);
+    if HAS_SKY {
+        texel = random4(walk, vertex, DIMENSION_SKY);
+    }
+    return texel;
+}

@@ -1,0 +1,11 @@
+//! What the whole-system tests share: scenes built in memory, skies, and statistics; and the scenes that the repository ships.
+
+pub mod glb;
+pub mod how_to;
+pub mod material;
+pub mod rendering;
+pub mod scene_builder;
+pub mod shape;
+pub mod shipped_scenes;
+pub mod sky;
+pub mod statistics;

@@ -1,0 +1,236 @@
+//! Renders scenes for tests, one at a time, on the best adapter of the machine: Mesa's software driver in CI.
+
+use crate::scene_builder::SceneBuilder;
+use crate::sky::Sky;
+use crate::statistics::Pixels;
+use kernelgen::plan::Plan;
+use runtime::configs::Library;
+use runtime::device::{DeviceOptions, Gpu};
+use runtime::film::Sums;
+use runtime::image_file::Image;
+use runtime::render::{Rendered, Session, Settings, Until};
+use runtime::scene::{Accelerator, LoadOptions, Scene};
+use runtime::settings::{RenderFile, SetValue};
+use std::borrow::Cow;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+/// Batches that a render is cut into, so that its standard errors are good to a tenth.
+const BATCHES: u32 = 64;
+
+/// The device of all tests of a program. Renders take turns: they use all cores of a software device anyway.
+static GPU: LazyLock<Mutex<Gpu>> = LazyLock::new(|| {
+    Mutex::new(Gpu::open(&DeviceOptions::default()).expect("there is a Vulkan device, if only Mesa's software driver"))
+});
+
+/// What to render and how. Every setter returns the job.
+#[derive(Clone, Debug)]
+pub struct Job {
+    scene: PathBuf,
+    options: LoadOptions,
+    settings: RenderFile,
+    library: Library,
+    size: [u32; 2],
+    samples: u32,
+    seed: u32,
+}
+
+/// A rendered image and what was counted.
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// Radiance with standard errors.
+    pub pixels: Pixels,
+    /// Contributions that the film refused.
+    pub rejected: u64,
+    /// Rays of all kinds.
+    pub rays: u64,
+    /// Sums of a fixed-point film: what must be equal bit for bit where images must be. Empty for other films.
+    pub sums: Vec<i64>,
+}
+
+impl Job {
+    /// A job on a scene file, or on a folder with a `scene.toml`.
+    pub fn of_file(scene: impl Into<PathBuf>) -> Job {
+        Job {
+            scene: scene.into(),
+            options: LoadOptions::default(),
+            settings: RenderFile::default().with_defaults(),
+            library: Library::default(),
+            size: [32, 32],
+            samples: 64,
+            seed: 1,
+        }
+    }
+
+    /// The pipeline.
+    pub fn pipeline(mut self, name: &str) -> Job {
+        self.settings.pipeline = Some(name.into());
+        self
+    }
+
+    /// The layout.
+    pub fn layout(mut self, name: &str) -> Job {
+        self.settings.layout = Some(name.into());
+        self
+    }
+
+    /// Other configs and stages than the shipped ones.
+    pub fn library(mut self, library: Library) -> Job {
+        self.library = library;
+        self
+    }
+
+    /// The camera, by name or index.
+    pub fn camera(mut self, name: &str) -> Job {
+        self.options.camera = Some(name.into());
+        self
+    }
+
+    /// A thin lens: its radius and the distance that is in focus, metres.
+    pub fn lens(mut self, radius: f32, focus_distance: f32) -> Job {
+        self.options.lens_radius = radius;
+        self.options.focus_distance = Some(focus_distance);
+        self
+    }
+
+    /// Width and height in pixels.
+    pub fn size(mut self, width: u32, height: u32) -> Job {
+        self.size = [width, height];
+        self
+    }
+
+    /// Samples per pixel.
+    pub fn samples(mut self, samples: u32) -> Job {
+        self.samples = samples;
+        self
+    }
+
+    /// Seed of the random numbers.
+    pub fn seed(mut self, seed: u32) -> Job {
+        self.seed = seed;
+        self
+    }
+
+    /// `--set KEY=VALUE`.
+    pub fn set(mut self, key: &str, value: impl ToString) -> Job {
+        self.settings.set.insert(key.into(), SetValue::Text(value.to_string()));
+        self
+    }
+
+    /// Longest path in edges.
+    pub fn edges(self, edges: u32) -> Job {
+        self.set("max_edges", edges)
+    }
+
+    /// The fixed-point film: sums that do not depend on their order.
+    pub fn fixed_point(self) -> Job {
+        self.set("accumulate", "fixed_i64")
+    }
+
+    /// Renders.
+    #[track_caller]
+    pub fn render(&self) -> Rendering {
+        let mut scene = self.load();
+        let plan = self.generate(&scene);
+        if plan.buffers.iter().any(|buffer| buffer.name == "bvh2_nodes") {
+            scene.set_accelerator(Accelerator::Bvh2);
+        }
+        // A test that failed while it rendered leaves the device as it was: every render makes its own buffers.
+        let gpu = GPU.lock().unwrap_or_else(PoisonError::into_inner);
+        let settings = Settings { size: self.size, seed: self.seed, paths: None };
+        let resources = |name: &str| scene.resource(name).map(Cow::Borrowed);
+        let mut session =
+            Session::new(&gpu, &plan, &resources, settings, Some(self.samples)).expect("the plan fits the device");
+        for batch in 1..=u64::from(BATCHES) {
+            let samples = u64::from(self.samples) * batch / u64::from(BATCHES);
+            session.run(Until::Samples(samples as u32), &mut |_| true).expect("the render runs");
+        }
+        rendering(&session.picture().expect("the picture can be read"))
+    }
+
+    fn load(&self) -> Scene {
+        let options = LoadOptions { size: Some((self.size[0], self.size[1])), ..self.options.clone() };
+        runtime::scene::load(&self.scene, &options).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn generate(&self, scene: &Scene) -> Plan {
+        let mut library = self.library.clone();
+        let selection =
+            self.settings.selection(&mut library, scene.effects.clone()).unwrap_or_else(|error| panic!("{error}"));
+        match kernelgen::generate(&library.sources, &selection) {
+            Ok(generated) => generated.plan,
+            Err(refusal) => panic!("{}", refusal.render(false)),
+        }
+    }
+}
+
+fn rendering(rendered: &Rendered) -> Rendering {
+    let counters = &rendered.counters;
+    let unknown = vec![0.0; rendered.mean.len()];
+    Rendering {
+        pixels: pixels(rendered.size, &rendered.mean, rendered.standard_error.as_ref().unwrap_or(&unknown)),
+        rejected: counters.rejected,
+        rays: counters.primary + counters.secondary + counters.deep + counters.visibility,
+        sums: match &rendered.totals.sums {
+            Sums::Fixed(units) => units.clone(),
+            Sums::Float(_) => Vec::new(),
+        },
+    }
+}
+
+fn pixels(size: [u32; 2], mean: &[f32], errors: &[f32]) -> Pixels {
+    let triples = |values: &[f32]| values.chunks_exact(3).map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    Pixels { width: size[0] as usize, height: size[1] as usize, rgb: triples(mean), errors: triples(errors) }
+}
+
+/// A scene of a test, written to a folder that is removed with it.
+#[derive(Debug)]
+pub struct BuiltScene {
+    folder: PathBuf,
+    sky: Option<PathBuf>,
+}
+
+impl BuiltScene {
+    /// Writes a scene, with a sky or without.
+    pub fn new(scene: &SceneBuilder, sky: Option<&Sky>) -> BuiltScene {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let folder = std::env::temp_dir().join(format!("pathloom-test-{}-{number}", std::process::id()));
+        fs::create_dir_all(&folder).expect("the temporary folder can be written");
+        fs::write(folder.join("scene.glb"), scene.to_glb()).expect("the scene can be written");
+        let sky = sky.map(|sky| {
+            let path = folder.join("sky.exr");
+            fs::write(&path, sky.to_exr().expect("the sky has texels")).expect("the sky can be written");
+            path
+        });
+        BuiltScene { folder, sky }
+    }
+
+    /// A job on this scene.
+    pub fn job(&self) -> Job {
+        let mut job = Job::of_file(self.folder.join("scene.glb"));
+        job.options.env = self.sky.clone();
+        job
+    }
+}
+
+impl Drop for BuiltScene {
+    fn drop(&mut self) {
+        // What cannot be removed stays in the system's temporary folder; no test depends on it.
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+/// The file of a shipped scene.
+pub fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../configs/scenes/{name}/{name}.glb"))
+}
+
+/// A reference image: `R,G,B` the mean radiance, `sem.R,sem.G,sem.B` its standard error.
+pub fn read_reference(path: &Path) -> Pixels {
+    let image = Image::load(path).unwrap_or_else(|error| panic!("{error}"));
+    let errors = image.standard_error.expect("a reference has standard errors");
+    pixels(image.size, &image.radiance, &errors)
+}

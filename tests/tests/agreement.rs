@@ -1,0 +1,87 @@
+//! Pipelines that can sample the same light converge to the same image: block means agree within their standard errors.
+
+use glam::{DVec3, dvec3};
+use tests::material::Material;
+use tests::rendering::{BuiltScene, Job, Rendering, shipped};
+use tests::scene_builder::{Camera, SceneBuilder};
+use tests::shape::sphere;
+use tests::statistics::{spread, z_scores};
+
+const BLOCK: usize = 8;
+/// f32 sums of radiance, as a share of the value.
+const ROUNDING: f64 = 1e-4;
+
+#[track_caller]
+fn assert_agree(a: &Rendering, b: &Rendering, what: &str) {
+    assert_eq!((a.rejected, b.rejected), (0, 0), "{what}: rejected contributions");
+    let spread = spread(&z_scores(&a.pixels.block_estimates(BLOCK), &b.pixels.block_estimates(BLOCK), ROUNDING));
+    assert!(spread.agrees(), "{what}: blocks {spread:?}");
+    let (mean_a, mean_b) = (a.pixels.mean_estimate(), b.pixels.mean_estimate());
+    let z = mean_a.z(&mean_b, ROUNDING * mean_a.mean);
+    assert!(z.abs() < 4.0, "{what}: whole image {mean_a:?} against {mean_b:?}");
+    for mean in [mean_a, mean_b] {
+        assert!(mean.error < 0.01 * mean.mean, "{what}: {mean:?} is too noisy to test anything");
+    }
+}
+
+fn render_all(job: &Job, pipelines: &[(&str, u32)]) -> Vec<Rendering> {
+    let with = |&(pipeline, samples): &(&str, u32)| job.clone().pipeline(pipeline).samples(samples).render();
+    pipelines.iter().map(with).collect()
+}
+
+#[test]
+fn nee_pt_and_lt_agree_on_the_cornell_box() {
+    let job = Job::of_file(shipped("cornell_box")).size(48, 48).edges(4);
+    let renders = render_all(&job, &[("nee", 256), ("pt", 256), ("lt", 512)]);
+    assert_agree(&renders[0], &renders[1], "nee and pt");
+    assert_agree(&renders[2], &renders[1], "lt and pt");
+}
+
+#[test]
+fn balance_and_power_heuristic_agree() {
+    let job = Job::of_file(shipped("cornell_box")).size(48, 48).edges(4).samples(128);
+    let renders = ["balance", "power"].map(|heuristic| job.clone().set("heuristic", heuristic).render());
+    assert_agree(&renders[0], &renders[1], "balance and power");
+}
+
+#[test]
+fn nee_and_pt_agree_on_one_light_of_each_kind() {
+    let job = Job::of_file(shipped("light_kinds")).size(64, 40).edges(4);
+    let renders = render_all(&job, &[("nee", 512), ("pt", 512)]);
+    assert_agree(&renders[0], &renders[1], "nee and pt");
+}
+
+#[test]
+fn lt_agrees_where_no_light_is_at_infinity() {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(Material::lambert("floor", [0.6, 0.5, 0.4]));
+    let panel = scene.material(Material::emitter("panel", [4.0, 1.0, 2.0]).two_sided());
+    scene.floor(floor, 0.0, 4.0);
+    scene.quad(floor, dvec3(-2.0, 0.0, -2.0), DVec3::X * 4.0, DVec3::Y * 2.5);
+    scene.quad(panel, dvec3(-1.2, 0.8, -0.4), DVec3::X * 0.5, DVec3::Y * 0.4);
+    scene.point_light(dvec3(0.5, 1.2, 0.2), [0.5, 1.0, 0.2]);
+    scene.spot_light(dvec3(1.2, 2.0, 0.8), dvec3(-0.5, -1.0, -0.4), [3.0, 2.0, 6.0], 0.3, 0.5);
+    scene.camera("main", Camera { eye: dvec3(0.0, 1.4, 4.5), target: dvec3(0.0, 0.7, 0.0), yfov: 40.0, aspect: 1.0 });
+    let scene = BuiltScene::new(&scene, None);
+    let job = scene.job().size(48, 48).edges(4);
+    let renders = render_all(&job, &[("pt", 256), ("lt", 512)]);
+    assert_agree(&renders[1], &renders[0], "lt and pt");
+}
+
+/// A caustic of a glass ball: walks from the camera find the light by chance, walks from the light find the floor.
+#[test]
+fn lt_and_pt_agree_on_a_caustic() {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(Material::lambert("floor", [0.7; 3]));
+    let glass = scene.material(Material::glass("glass", 1.5, 0.0));
+    let light = scene.material(Material::emitter("light", [3.0; 3]));
+    scene.floor(floor, 0.0, 4.0);
+    scene.mesh(glass, sphere(dvec3(0.0, 0.6, 0.0), 0.4, 16).flat());
+    scene.ceiling(light, 2.0, 1.6);
+    // The ball itself is out of the picture: walks from the light cannot be joined to a camera through smooth glass.
+    scene.camera("main", Camera { eye: dvec3(0.0, 0.15, 3.0), target: dvec3(0.0, 0.0, 0.0), yfov: 6.0, aspect: 2.0 });
+    let scene = BuiltScene::new(&scene, None);
+    let job = scene.job().size(48, 24).edges(8);
+    let renders = render_all(&job, &[("pt", 2048), ("lt", 4096)]);
+    assert_agree(&renders[1], &renders[0], "lt and pt");
+}

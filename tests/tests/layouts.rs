@@ -1,0 +1,46 @@
+//! The layout never changes the image: bit for bit with the fixed-point film, for every layout in `configs/layouts`.
+
+use std::fs;
+use std::path::Path;
+use tests::rendering::{Job, shipped};
+
+fn layouts() -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/layouts");
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .expect("configs/layouts is there")
+        .filter_map(|entry| entry.expect("the folder can be read").path().file_stem()?.to_str().map(str::to_owned))
+        .collect();
+    names.sort();
+    names
+}
+
+fn job(pipeline: &str) -> Job {
+    Job::of_file(shipped("cornell_box")).pipeline(pipeline).size(40, 24).samples(4).edges(6).fixed_point()
+}
+
+#[test]
+fn aos_soa_and_aosoa_are_shipped() {
+    let layouts = layouts();
+    for name in ["aos", "soa", "aosoa32"] {
+        assert!(layouts.iter().any(|layout| layout == name), "configs/layouts/{name}.toml is missing");
+    }
+}
+
+#[test]
+fn every_layout_gives_the_same_bits() {
+    for pipeline in ["nee", "pt", "lt"] {
+        let expected = job(pipeline).layout("aos").render();
+        assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
+        for layout in layouts() {
+            let found = job(pipeline).layout(&layout).render();
+            assert!(found.sums == expected.sums, "{pipeline}: the image of {layout} is not that of aos");
+        }
+    }
+}
+
+#[test]
+fn the_seed_decides_the_image() {
+    let first = job("pt").seed(7).render();
+    assert!(first.sums == job("pt").seed(7).render().sums, "the same seed gives another image");
+    assert!(first.sums != job("pt").seed(8).render().sums, "another seed gives the same image");
+}
