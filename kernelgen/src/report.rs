@@ -287,17 +287,17 @@ impl Report {
             text.push('\n');
         }
         text.push_str(&columns(&self.kernel_rows()));
-        for (title, reasons) in [
-            ("dead", &self.dead),
-            ("effects kept", &self.effects.kept),
-            ("effects dropped", &self.effects.dropped),
-        ] {
+        for (title, reasons) in
+            [("dead", &self.dead), ("effects kept", &self.effects.kept), ("effects dropped", &self.effects.dropped)]
+        {
             if reasons.is_empty() {
                 continue;
             }
-            let rows: Vec<Vec<String>> =
-                reasons.iter().map(|row| vec![row.name.clone(), row.reason.clone()]).collect();
+            let rows: Vec<Vec<String>> = reasons.iter().map(|row| vec![row.name.clone(), row.reason.clone()]).collect();
             let _ = write!(text, "\n{title}\n{}", columns(&rows));
+        }
+        if !self.effects.unused.is_empty() {
+            let _ = writeln!(text, "\nno stage asks for {}", self.effects.unused.join(", "));
         }
         text
     }
@@ -305,9 +305,10 @@ impl Report {
     fn kernel_rows(&self) -> Vec<Vec<String>> {
         let mut rows = vec![["kernel", "loads B", "stores B"].map(str::to_owned).to_vec()];
         let stages = self.kernels.iter().filter(|kernel| !kernel.stages.is_empty());
-        rows.extend(stages.map(|kernel| {
-            vec![kernel.name.clone(), kernel.load_bytes.to_string(), kernel.store_bytes.to_string()]
-        }));
+        rows.extend(
+            stages
+                .map(|kernel| vec![kernel.name.clone(), kernel.load_bytes.to_string(), kernel.store_bytes.to_string()]),
+        );
         rows
     }
 

@@ -3,7 +3,6 @@
 use crate::device::Gpu;
 use crate::error::Error;
 use kernelgen::plan::{Access, Buffer, Plan, Role};
-use std::borrow::Cow;
 use wgpu::BufferUsages;
 
 /// Path slots on a GPU when not asked otherwise: enough to fill the largest cards.
@@ -16,7 +15,7 @@ const MOST_PATHS: u64 = 1 << 22;
 const GRAIN: u64 = 1024;
 
 /// Looks a scene resource up by its WGSL name.
-pub type Resources<'a> = dyn Fn(&str) -> Option<Cow<'a, [u8]>> + 'a;
+pub type Resources<'a> = dyn Fn(&str) -> Option<&'a [u8]> + 'a;
 
 /// The buffers of a plan, in its order; scene resources that no kernel binds are `None`.
 #[derive(Debug)]
@@ -61,7 +60,13 @@ impl Buffers {
 ///
 /// # Errors
 /// User input, when not even the smallest number fits or `wanted` is out of range.
-pub fn choose_path_count(gpu: &Gpu, plan: &Plan, pixels: u64, wanted: Option<u32>, work: Option<u64>) -> Result<u32, Error> {
+pub fn choose_path_count(
+    gpu: &Gpu,
+    plan: &Plan,
+    pixels: u64,
+    wanted: Option<u32>,
+    work: Option<u64>,
+) -> Result<u32, Error> {
     let default = if gpu.is_cpu() { DEFAULT_PATHS_CPU } else { DEFAULT_PATHS_GPU };
     let asked = wanted.map_or(default, u64::from);
     if asked == 0 || asked > MOST_PATHS {
@@ -95,7 +100,9 @@ fn too_large(gpu: &Gpu, name: &str, size: u64, limit: u64) -> Error {
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     Error::input(format!(
         "`{name}` takes {:.1} MiB, but the adapter `{}` binds at most {:.1} MiB at once",
-        mib(size), gpu.info.name, mib(limit)
+        mib(size),
+        gpu.info.name,
+        mib(limit)
     ))
 }
 
@@ -116,11 +123,22 @@ pub(crate) fn create(gpu: &Gpu, name: &str, size: u64, usage: BufferUsages) -> R
     if size > limit {
         return Err(too_large(gpu, name, size, limit));
     }
-    let description = wgpu::BufferDescriptor { label: Some(name), size: size.max(16).next_multiple_of(4), usage, mapped_at_creation: false };
+    let description = wgpu::BufferDescriptor {
+        label: Some(name),
+        size: size.max(16).next_multiple_of(4),
+        usage,
+        mapped_at_creation: false,
+    };
     gpu.scoped(name, || gpu.device.create_buffer(&description))
 }
 
-fn resource(gpu: &Gpu, plan: &Plan, index: usize, buffer: &Buffer, resources: &Resources) -> Result<Option<wgpu::Buffer>, Error> {
+fn resource(
+    gpu: &Gpu,
+    plan: &Plan,
+    index: usize,
+    buffer: &Buffer,
+    resources: &Resources,
+) -> Result<Option<wgpu::Buffer>, Error> {
     let bound: Vec<Access> = plan
         .kernels
         .iter()
@@ -132,7 +150,8 @@ fn resource(gpu: &Gpu, plan: &Plan, index: usize, buffer: &Buffer, resources: &R
         return Ok(None);
     }
     let name = &buffer.name;
-    let bytes = resources(name).ok_or_else(|| Error::failed(format!("the kernels read `{name}`, which the scene loader does not provide")))?;
+    let bytes = resources(name)
+        .ok_or_else(|| Error::failed(format!("the kernels read `{name}`, which the scene loader does not provide")))?;
     let mut usage = BufferUsages::COPY_DST;
     if bound.contains(&Access::Uniform) {
         usage |= BufferUsages::UNIFORM;

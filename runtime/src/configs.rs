@@ -91,19 +91,23 @@ impl Default for Library {
 
 impl Library {
     /// Resolves a word of the command line or of a render file to a config key: a shipped name, or a file, which is read with all
-    /// that it extends. Words with a `/` or ending in `.toml` are files; a file that is missing may be a key of `own`.
+    /// that it extends. Words with a `/` or ending in `.toml` are files, unless they are keys of `own`.
     ///
     /// # Errors
     /// User input, when there is neither a config of this name nor a file.
     pub fn resolve(&mut self, axis: Axis, word: &str) -> Result<String, Error> {
-        if !is_path(word) {
-            let key = format!("{}/{word}.toml", axis.folder());
-            return if self.sources.find(FileKind::Config, &key).is_some() { Ok(key) } else { Err(unknown(axis, word)) };
-        }
-        let path = Path::new(word);
-        if !path.is_file() && self.own.iter().any(|(key, _)| key == word) {
+        if self.own.iter().any(|(key, _)| key == word) {
             return Ok(word.to_owned());
         }
+        if !is_path(word) {
+            let key = format!("{}/{word}.toml", axis.folder());
+            return if self.sources.find(FileKind::Config, &key).is_some() {
+                Ok(key)
+            } else {
+                Err(unknown(axis, word))
+            };
+        }
+        let path = Path::new(word);
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let key = format!("{}/{name}", axis.folder());
         self.add_file(&key, path)?;
@@ -117,7 +121,8 @@ impl Library {
     }
 
     fn add_file(&mut self, key: &str, path: &Path) -> Result<(), Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::input(format!("cannot read the file: {error}")).in_file(path))?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| Error::input(format!("cannot read the file: {error}")).in_file(path))?;
         self.sources.add(FileKind::Config, key, path.display().to_string(), text.clone());
         self.own.push((key.to_owned(), text.clone()));
         for base in extends(&text) {
@@ -134,7 +139,9 @@ impl Library {
 
 /// Whether a word of the command line is a file rather than a name.
 pub fn is_path(word: &str) -> bool {
-    word.contains('/') || word.contains('\\') || Path::new(word).extension().is_some_and(|extension| extension == "toml")
+    word.contains('/')
+        || word.contains('\\')
+        || Path::new(word).extension().is_some_and(|extension| extension == "toml")
 }
 
 fn unknown(axis: Axis, word: &str) -> Error {
@@ -192,10 +199,19 @@ pub fn with_scene<T>(word: &str, use_path: impl FnOnce(&Path) -> Result<T, Error
     let folder = std::env::temp_dir().join(format!("pathloom-{}-{number}", std::process::id()));
     let result = unpack(word, &folder)
         .map_err(|error| Error::failed(format!("cannot unpack the scene `{word}`: {error}")).in_file(&folder))
-        .and_then(|()| use_path(&folder));
+        .and_then(|()| use_path(&folder).map_err(|error| shipped_place(error, word, &folder)));
     // Files left in the temporary folder do no harm.
     drop(std::fs::remove_dir_all(&folder));
     result
+}
+
+/// Names the shipped file where an error names the unpacked one.
+fn shipped_place(mut error: Error, name: &str, folder: &Path) -> Error {
+    let inside = error.file.as_ref().and_then(|file| file.strip_prefix(folder).ok().map(Path::to_path_buf));
+    if let Some(inside) = inside {
+        error.file = Some(Path::new("configs/scenes").join(name).join(inside));
+    }
+    error
 }
 
 fn unpack(name: &str, folder: &Path) -> std::io::Result<()> {

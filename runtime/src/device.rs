@@ -105,13 +105,20 @@ impl Gpu {
         let int64 = Features::SHADER_INT64 | Features::SHADER_INT64_ATOMIC_ALL_OPS;
         let missing = [
             (needs.int64_atomics, int64, "64-bit integer atomics", "--set schedule.accumulate=atomic_f32"),
-            (needs.float32_atomics, Features::SHADER_FLOAT32_ATOMIC, "32-bit float atomics", "--set schedule.accumulate=fixed_i64"),
+            (
+                needs.float32_atomics,
+                Features::SHADER_FLOAT32_ATOMIC,
+                "32-bit float atomics",
+                "--set schedule.accumulate=fixed_i64",
+            ),
             (needs.subgroup, Features::SUBGROUP, "subgroup operations", "--set schedule.queue=atomic"),
         ];
         for (needed, feature, what, way_out) in missing {
             if needed && !has.contains(feature) {
                 let name = &self.info.name;
-                return Err(Error::input(format!("the adapter `{name}` has no {what}, which this variant uses; avoid them with `{way_out}`")));
+                return Err(Error::input(format!(
+                    "the adapter `{name}` has no {what}, which this variant uses; avoid them with `{way_out}`"
+                )));
             }
         }
         Ok(())
@@ -123,7 +130,9 @@ impl Gpu {
     /// Failed, with the device's own words.
     pub fn check(&self) -> Result<(), Error> {
         let first = self.first_error.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
-        first.map_or(Ok(()), |message| Err(Error::failed(format!("the device `{}` reported: {message}", self.info.name))))
+        first.map_or(Ok(()), |message| {
+            Err(Error::failed(format!("the device `{}` reported: {message}", self.info.name)))
+        })
     }
 
     /// Runs `create` and turns a validation or memory error that it raises into an `Err`.
@@ -137,7 +146,9 @@ impl Gpu {
         let invalid = pollster::block_on(validation.pop());
         let exhausted = pollster::block_on(memory.pop());
         if let Some(error) = exhausted {
-            return Err(Error::failed(format!("{what}: out of device memory; fewer paths (`--paths`) or pixels need less ({error})")));
+            return Err(Error::failed(format!(
+                "{what}: out of device memory; fewer paths (`--paths`) or pixels need less ({error})"
+            )));
         }
         invalid.map_or(Ok(made), |error| Err(Error::failed(format!("{what}: {error}"))))
     }
@@ -147,8 +158,10 @@ impl Gpu {
     /// # Errors
     /// Failed, when wgpu refuses the text.
     pub fn module(&self, name: &str, text: &str) -> Result<wgpu::ShaderModule, Error> {
-        let checks = if self.checked { wgpu::ShaderRuntimeChecks::checked() } else { wgpu::ShaderRuntimeChecks::unchecked() };
-        let description = wgpu::ShaderModuleDescriptor { label: Some(name), source: wgpu::ShaderSource::Wgsl(text.into()) };
+        let checks =
+            if self.checked { wgpu::ShaderRuntimeChecks::checked() } else { wgpu::ShaderRuntimeChecks::unchecked() };
+        let description =
+            wgpu::ShaderModuleDescriptor { label: Some(name), source: wgpu::ShaderSource::Wgsl(text.into()) };
         // SAFETY: kernels index their buffers by values below `path_count`, the film's size and counts the generator bounds,
         // and every loop in them ends; that they do is what `--checked` is there to find out.
         self.scoped(name, || unsafe { self.device.create_shader_module_trusted(description, checks) })
@@ -171,12 +184,14 @@ impl Gpu {
     /// Failed, when the device is lost or out of memory.
     pub fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, Error> {
         let size = buffer.size();
-        let staging = self.scoped("read-back", || self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read-back"),
-            size,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        }))?;
+        let staging = self.scoped("read-back", || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("read-back"),
+                size,
+                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        })?;
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
         let submission = self.queue.submit([encoder.finish()]);

@@ -111,6 +111,7 @@ struct Flight {
     submission: wgpu::SubmissionIndex,
     staging: wgpu::Buffer,
     profiled: bool,
+    first: bool,
 }
 
 /// A plan ready to run.
@@ -128,6 +129,7 @@ pub struct Executor {
     spare: Vec<wgpu::Buffer>,
     flying: VecDeque<Flight>,
     queries: Option<Queries>,
+    warm: bool,
     /// Times of the passes that were measured.
     pub profile: Profile,
 }
@@ -154,6 +156,7 @@ impl Executor {
             pipelines,
             workgroups: plan.kernels.iter().map(|kernel| kernel.workgroup).collect(),
             queries: None,
+            warm: false,
             profile: Profile::new(plan),
             program,
             arguments: arguments.and_then(|index| buffers.all[index].clone()),
@@ -200,11 +203,17 @@ impl Executor {
     ///
     /// # Errors
     /// Failed, when no slot is free or the device reported an error.
-    pub fn submit(&mut self, pass: Pass, measure: bool, after: impl FnOnce(&mut wgpu::CommandEncoder)) -> Result<(), Error> {
+    pub fn submit(
+        &mut self,
+        pass: Pass,
+        measure: bool,
+        after: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) -> Result<(), Error> {
         let staging = self.spare.pop().ok_or_else(|| Error::failed("no slot is free for another pass"))?;
         let profiled = measure && self.queries.is_some() && !self.flying.iter().any(|flight| flight.profiled);
         self.gpu.queue.write_buffer(&self.pass, 0, bytemuck::bytes_of(&pass));
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("pass") });
+        let mut encoder =
+            self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("pass") });
         self.encode(&mut encoder, pass.active, profiled);
         let size = self.counted.end - self.counted.start;
         encoder.copy_buffer_to_buffer(&self.control, self.counted.start, &staging, 0, size);
@@ -217,13 +226,15 @@ impl Executor {
         if let Some(queries) = self.queries.as_ref().filter(|_| profiled) {
             queries.map();
         }
-        self.flying.push_back(Flight { submission, staging, profiled });
+        let first = !std::mem::replace(&mut self.warm, true);
+        self.flying.push_back(Flight { submission, staging, profiled, first });
         self.gpu.check()
     }
 
     fn encode(&self, encoder: &mut wgpu::CommandEncoder, active: u32, profiled: bool) {
         let queries = self.queries.as_ref().filter(|_| profiled);
-        let mut compute = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("pass"), timestamp_writes: None });
+        let mut compute =
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("pass"), timestamp_writes: None });
         if let Some(queries) = queries {
             queries.stamp(&mut compute, 0);
         }
@@ -261,7 +272,7 @@ impl Executor {
         let counters = self.counted_in(&bytes);
         if let Some(queries) = self.queries.as_ref().filter(|_| flight.profiled) {
             let times = queries.read(&self.gpu)?;
-            self.profile.add(&self.program, &times, &counters);
+            self.profile.add(&self.program, &times, &counters, flight.first);
         }
         refuse_losses(&counters)?;
         Ok(counters)
@@ -283,11 +294,15 @@ impl Executor {
 fn refuse_losses(counters: &Counters) -> Result<(), Error> {
     if counters.overflow > 0 {
         let lost = counters.overflow;
-        return Err(Error::failed(format!("a stream overflowed: {lost} records were lost in one pass, so the picture would be wrong")));
+        return Err(Error::failed(format!(
+            "a stream overflowed: {lost} records were lost in one pass, so the picture would be wrong"
+        )));
     }
     if counters.unfinished > 0 {
         let left = counters.unfinished;
-        return Err(Error::failed(format!("{left} paths were still alive after the last round: the pipeline's `rounds` is too small")));
+        return Err(Error::failed(format!(
+            "{left} paths were still alive after the last round: the pipeline's `rounds` is too small"
+        )));
     }
     Ok(())
 }
@@ -340,7 +355,9 @@ fn bind_group_layout(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::BindGroupLayout
     let storage = kernel.bindings.iter().filter(|binding| binding.access != Access::Uniform).count();
     if storage > most {
         let (name, adapter) = (&kernel.name, &gpu.info.name);
-        return Err(Error::input(format!("the kernel `{name}` binds {storage} storage buffers, but the adapter `{adapter}` allows {most}")));
+        return Err(Error::input(format!(
+            "the kernel `{name}` binds {storage} storage buffers, but the adapter `{adapter}` allows {most}"
+        )));
     }
     let entries: Vec<_> = kernel
         .bindings
@@ -348,7 +365,11 @@ fn bind_group_layout(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::BindGroupLayout
         .map(|binding| wgpu::BindGroupLayoutEntry {
             binding: binding.binding,
             visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer { ty: binding_type(binding.access), has_dynamic_offset: false, min_binding_size: None },
+            ty: wgpu::BindingType::Buffer {
+                ty: binding_type(binding.access),
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
             count: None,
         })
         .collect();
@@ -364,12 +385,20 @@ fn binding_type(access: Access) -> wgpu::BufferBindingType {
     }
 }
 
-fn bind_group(gpu: &Gpu, plan: &Plan, kernel: &Kernel, buffers: &Buffers, layout: &wgpu::BindGroupLayout) -> Result<wgpu::BindGroup, Error> {
+fn bind_group(
+    gpu: &Gpu,
+    plan: &Plan,
+    kernel: &Kernel,
+    buffers: &Buffers,
+    layout: &wgpu::BindGroupLayout,
+) -> Result<wgpu::BindGroup, Error> {
     let mut entries = Vec::with_capacity(kernel.bindings.len());
     for binding in &kernel.bindings {
         let name = plan.buffers.get(binding.buffer).map_or("?", |buffer| buffer.name.as_str());
         let buffer = buffers.all.get(binding.buffer).and_then(Option::as_ref);
-        let buffer = buffer.ok_or_else(|| Error::failed(format!("the kernel `{}` binds `{name}`, which was not allocated", kernel.name)))?;
+        let buffer = buffer.ok_or_else(|| {
+            Error::failed(format!("the kernel `{}` binds `{name}`, which was not allocated", kernel.name))
+        })?;
         entries.push(wgpu::BindGroupEntry { binding: binding.binding, resource: buffer.as_entire_binding() });
     }
     let description = wgpu::BindGroupDescriptor { label: Some(&kernel.name), layout, entries: &entries };

@@ -100,30 +100,39 @@ impl Accumulator {
     pub fn new(gpu: &Gpu, kind: Accumulate, pixels: u64, film: &wgpu::Buffer) -> Result<Self, Error> {
         let words = u32::try_from(pixels * 3).map_err(|_| Error::input("the picture has too many pixels"))?;
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
-        let uniform = create(gpu, "batch", size_of::<BatchUniform>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?;
+        let uniform =
+            create(gpu, "batch", size_of::<BatchUniform>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?;
         let sums = create(gpu, "sums", u64::from(words) * 8, storage)?;
         let spread = create(gpu, "spread", u64::from(words) * 4, storage)?;
-        let text = if kind == Accumulate::FixedI64 { include_str!("film/gather_fixed.wgsl") } else { include_str!("film/gather_float.wgsl") };
+        let text = if kind == Accumulate::FixedI64 {
+            include_str!("film/gather_fixed.wgsl")
+        } else {
+            include_str!("film/gather_float.wgsl")
+        };
         let module = gpu.module("gather", text)?;
-        let pipeline = gpu.scoped("gather", || gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("gather"),
-            layout: None,
-            module: &module,
-            entry_point: Some("gather"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        }))?;
+        let pipeline = gpu.scoped("gather", || {
+            gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("gather"),
+                layout: None,
+                module: &module,
+                entry_point: Some("gather"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })
+        })?;
         let entry = |binding, buffer: &'_ wgpu::Buffer| (binding, buffer.clone());
         let bound = [entry(0, &uniform), entry(1, film), entry(2, &sums), entry(3, &spread)];
         let entries: Vec<_> = bound
             .iter()
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() })
             .collect();
-        let bindings = gpu.scoped("gather", || gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("gather"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        }))?;
+        let bindings = gpu.scoped("gather", || {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("gather"),
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            })
+        })?;
         Ok(Self { kind, words, uniform, sums, spread, pipeline, bindings })
     }
 
@@ -132,7 +141,8 @@ impl Accumulator {
         let batch = BatchUniform { samples: samples as f32, before: before as f32, words: self.words, unused: 0 };
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&batch));
         let groups = self.words.div_ceil(WORKGROUP);
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("gather"), timestamp_writes: None });
+        let mut pass =
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("gather"), timestamp_writes: None });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
         pass.dispatch_workgroups(groups.min(WIDEST), groups.div_ceil(WIDEST), 1);

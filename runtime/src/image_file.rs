@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::film::{Sums, Totals};
 use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers, SmallVec,
-    Text, WritableImage, read,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers,
+    SmallVec, Text, WritableImage, read,
 };
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,10 @@ impl Image {
         let size = [layer.size.0 as u32, layer.size.1 as u32];
         let find = |name: &str| {
             let channels = &layer.channel_data.list;
-            channels.iter().find(|channel| channel.name.as_slice() == name.as_bytes()).map(|channel| &channel.sample_data)
+            channels
+                .iter()
+                .find(|channel| channel.name.as_slice() == name.as_bytes())
+                .map(|channel| &channel.sample_data)
         };
         let radiance = interleave(COLOURS.map(find))
             .ok_or_else(|| Error::input(format!("`{shown}` has no channels R, G and B")))?;
@@ -65,7 +68,8 @@ impl Image {
         for (index, colour) in COLOURS.iter().enumerate() {
             channels.push(AnyChannel::new(*colour, FlatSamples::F32(plane(&self.radiance, index))));
             if let Some(errors) = &self.standard_error {
-                channels.push(AnyChannel::new(format!("sem.{colour}").as_str(), FlatSamples::F32(plane(errors, index))));
+                channels
+                    .push(AnyChannel::new(format!("sem.{colour}").as_str(), FlatSamples::F32(plane(errors, index))));
             }
             if let Some(sums) = &self.fixed {
                 let half = |shift: u32| plane(sums, index).iter().map(|&sum| (sum >> shift) as u32).collect();
@@ -91,9 +95,11 @@ impl Image {
             None => Sums::Float(self.radiance.iter().map(|&mean| f64::from(mean) * f64::from(samples)).collect()),
         };
         let scale = f64::from(batches.saturating_sub(1)) * f64::from(samples);
-        let spread = self.standard_error.as_ref().map(|errors| {
-            errors.iter().map(|&error| (f64::from(error).powi(2) * scale) as f32).collect()
-        });
+        let spread = match &self.standard_error {
+            Some(errors) => Some(errors.iter().map(|&error| (f64::from(error).powi(2) * scale) as f32).collect()),
+            // One batch does not deviate from itself.
+            None => (batches <= 1).then(|| vec![0.0; self.radiance.len()]),
+        };
         Totals { samples, batches, sums, spread }
     }
 }
@@ -137,8 +143,13 @@ fn fixed_sums<'a>(find: &impl Fn(&str) -> Option<&'a FlatSamples>) -> Option<Vec
     for colour in COLOURS {
         planes.push((words(format!("sum.{colour}.low"))?, words(format!("sum.{colour}.high"))?));
     }
-    let sum = |pixel: usize, (low, high): &(&Vec<u32>, &Vec<u32>)| (i64::from(high[pixel]) << 32) | i64::from(low[pixel]);
-    Some((0..planes[0].0.len()).flat_map(|pixel| [sum(pixel, &planes[0]), sum(pixel, &planes[1]), sum(pixel, &planes[2])]).collect())
+    let sum =
+        |pixel: usize, (low, high): &(&Vec<u32>, &Vec<u32>)| (i64::from(high[pixel]) << 32) | i64::from(low[pixel]);
+    Some(
+        (0..planes[0].0.len())
+            .flat_map(|pixel| [sum(pixel, &planes[0]), sum(pixel, &planes[1]), sum(pixel, &planes[2])])
+            .collect(),
+    )
 }
 
 fn text_of(value: &AttributeValue) -> Option<String> {

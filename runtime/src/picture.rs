@@ -57,8 +57,15 @@ fn encode(linear: f32) -> f32 {
 /// Failed, when the file cannot be written.
 pub fn write_png(path: &Path, size: [u32; 2], rgb: &[u8]) -> Result<(), Error> {
     crate::image_file::replace(path, |temporary| {
-        image::save_buffer_with_format(temporary, rgb, size[0], size[1], image::ColorType::Rgb8, image::ImageFormat::Png)
-            .map_err(|error| error.to_string())
+        image::save_buffer_with_format(
+            temporary,
+            rgb,
+            size[0],
+            size[1],
+            image::ColorType::Rgb8,
+            image::ImageFormat::Png,
+        )
+        .map_err(|error| error.to_string())
     })
 }
 

@@ -28,7 +28,8 @@ impl Queries {
     pub fn new(gpu: &Gpu, dispatches: usize) -> Result<Self, Error> {
         let count = dispatches + 1;
         let size = (count * 8) as u64;
-        let buffer = |usage| wgpu::BufferDescriptor { label: Some("timestamps"), size, usage, mapped_at_creation: false };
+        let buffer =
+            |usage| wgpu::BufferDescriptor { label: Some("timestamps"), size, usage, mapped_at_creation: false };
         gpu.scoped("timestamps", || Self {
             sets: (0..count.div_ceil(SET))
                 .map(|set| {
@@ -40,7 +41,9 @@ impl Queries {
                 })
                 .collect(),
             count,
-            resolved: gpu.device.create_buffer(&buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC)),
+            resolved: gpu
+                .device
+                .create_buffer(&buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC)),
             staging: gpu.device.create_buffer(&buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)),
         })
     }
@@ -97,6 +100,7 @@ pub struct Profile {
     kernel_ns: Vec<f64>,
     kind_ns: ByKind,
     rays: Counters,
+    cold: bool,
     /// Passes that were measured.
     pub passes: u32,
 }
@@ -112,8 +116,13 @@ impl Profile {
         }
     }
 
-    /// Adds a measured pass: the duration of every dispatch in ns, and the rays it counted.
-    pub fn add(&mut self, program: &[Command], times: &[f64], counters: &Counters) {
+    /// Adds a measured pass: the duration of every dispatch in ns, and the rays it counted. A `cold` one, the first of all, in
+    /// which drivers compile and clear, counts only until there is another.
+    pub fn add(&mut self, program: &[Command], times: &[f64], counters: &Counters, cold: bool) {
+        if self.cold && !cold {
+            self.forget();
+        }
+        self.cold = cold;
         for (command, &time) in program.iter().zip(times) {
             self.kernel_ns[command.kernel] += time;
             match (self.kinds[command.kernel], command.round) {
@@ -126,6 +135,13 @@ impl Profile {
         }
         self.rays.add(counters);
         self.passes += 1;
+    }
+
+    fn forget(&mut self) {
+        self.kernel_ns.fill(0.0);
+        self.kind_ns = ByKind::default();
+        self.rays = Counters::default();
+        self.passes = 0;
     }
 
     /// Milliseconds a measured pass spent in each kernel, on average.

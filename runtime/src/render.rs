@@ -15,7 +15,7 @@ const PASS_SECONDS: f64 = 0.5;
 const SMALLEST_PASS: u32 = 16_384;
 /// A render of known length is cut into at least this many batches, for standard errors.
 const FEWEST_BATCHES: u32 = 8;
-/// The first pass warms up; every pass up to this one is measured, and then every so many-th.
+/// Every pass up to this one is measured, and then every so many-th.
 const MEASURED_FIRST: u64 = 8;
 const MEASURED_EVERY: u64 = 16;
 /// How often the error is looked at when rendering until it is small, s.
@@ -89,6 +89,7 @@ pub struct Session {
     spread_known: bool,
     samples_before: u32,
     passes: u64,
+    finished: Option<Instant>,
     taken: u64,
     counters: Counters,
     seconds: f64,
@@ -100,7 +101,13 @@ impl Session {
     ///
     /// # Errors
     /// User input when the adapter cannot run the plan or the picture does not fit; failed when a kernel does not compile.
-    pub fn new(gpu: &Gpu, plan: &Plan, resources: &Resources, settings: Settings, work: Option<u32>) -> Result<Self, Error> {
+    pub fn new(
+        gpu: &Gpu,
+        plan: &Plan,
+        resources: &Resources,
+        settings: Settings,
+        work: Option<u32>,
+    ) -> Result<Self, Error> {
         gpu.require(&plan.needs)?;
         let pixels = pixels_of(settings.size)?;
         let total = work.map(|samples| u64::from(samples) * u64::from(pixels));
@@ -121,6 +128,7 @@ impl Session {
             spread_known: true,
             samples_before: 0,
             passes: 0,
+            finished: None,
             taken: 0,
             counters: Counters::default(),
             seconds: 0.0,
@@ -152,6 +160,7 @@ impl Session {
     /// Failed, when the device is lost, a stream overflowed or paths were left unfinished.
     pub fn run(&mut self, until: Until, watch: &mut dyn FnMut(&Progress) -> bool) -> Result<(), Error> {
         let start = Instant::now();
+        self.finished = None;
         let before = self.seconds;
         let mut stop = false;
         let mut looked = Instant::now();
@@ -210,9 +219,7 @@ impl Session {
         let mut done = 0;
         while done < work {
             if !self.executor.has_room() || self.executor.in_flight() >= IN_FLIGHT {
-                let before = Instant::now();
-                let active = self.finish_pass()?;
-                self.pace(active, before.elapsed().as_secs_f64());
+                self.finish_pass()?;
                 after_pass(self, start.elapsed().as_secs_f64());
             }
             let active = u64::from(self.pass_limit).min(work - done) as u32;
@@ -239,7 +246,7 @@ impl Session {
             unused: [0; 2],
         };
         let number = self.passes;
-        let measure = (1..=MEASURED_FIRST).contains(&number) || number % MEASURED_EVERY == 0;
+        let measure = number <= MEASURED_FIRST || number.is_multiple_of(MEASURED_EVERY);
         let (gpu, accumulator, samples) = (&self.gpu, &self.accumulator, self.samples);
         self.executor.submit(pass, measure, |encoder| {
             if let Some(batch) = ends {
@@ -251,31 +258,45 @@ impl Session {
         Ok(())
     }
 
-    /// Waits for the oldest pass and returns how many slots it had.
-    fn finish_pass(&mut self) -> Result<u32, Error> {
+    /// Waits for the oldest pass and adds what it counted.
+    fn finish_pass(&mut self) -> Result<(), Error> {
         let counters = self.executor.wait()?;
         self.counters.add(&counters);
         let active = self.sizes.pop_front().unwrap_or(0);
         self.taken += u64::from(active);
-        Ok(active)
+        let now = Instant::now();
+        if let Some(before) = self.finished.replace(now) {
+            self.pace(active, (now - before).as_secs_f64());
+        }
+        Ok(())
     }
 
-    /// Shortens passes on slow devices. With the queue full, the wait for a pass is about the time it took.
+    /// Fits the size of passes to the device. While the queue is full, a pass takes the time between two completions; the first
+    /// one, which may compile and clear, is left out.
     fn pace(&mut self, active: u32, seconds: f64) {
-        if seconds > PASS_SECONDS && active >= self.pass_limit {
-            let shorter = (f64::from(active) * PASS_SECONDS / seconds) as u32;
-            self.pass_limit = (shorter / 1024 * 1024).max(SMALLEST_PASS).min(self.path_count);
+        let fitting = f64::from(active) * PASS_SECONDS / seconds.max(1e-6);
+        let slow = seconds > PASS_SECONDS;
+        let quick = seconds < PASS_SECONDS / 4.0 && active >= self.pass_limit && self.pass_limit < self.path_count;
+        if slow || quick {
+            let wanted = fitting.min(2.0 * f64::from(self.pass_limit)) as u32;
+            self.pass_limit = (wanted / 1024 * 1024).max(SMALLEST_PASS).min(self.path_count);
         }
     }
 
     fn progress(&self, until: Until, elapsed: f64, run: f64) -> Progress {
         let pixels = f64::from(self.settings.size[0]) * f64::from(self.settings.size[1]);
         let part = match until {
-            Until::Samples(wanted) => Some(self.taken as f64 / (pixels * f64::from(wanted - self.samples_before.min(wanted)).max(1.0))),
+            Until::Samples(wanted) => {
+                Some(self.taken as f64 / (pixels * f64::from(wanted - self.samples_before.min(wanted)).max(1.0)))
+            }
             Until::Seconds(wanted) => Some(run / wanted),
             Until::Error(_) => None,
         };
-        Progress { taken: self.taken, per_second: self.taken as f64 / elapsed.max(1e-9), part: part.map(|part| part.min(1.0)) }
+        Progress {
+            taken: self.taken,
+            per_second: self.taken as f64 / elapsed.max(1e-9),
+            part: part.map(|part| part.min(1.0)),
+        }
     }
 
     /// Reads what has been accumulated.
@@ -313,7 +334,13 @@ impl Session {
 ///
 /// # Errors
 /// As `Session::new` and `Session::run`.
-pub fn render(gpu: &Gpu, plan: &Plan, resources: &Resources, settings: Settings, samples: u32) -> Result<Rendered, Error> {
+pub fn render(
+    gpu: &Gpu,
+    plan: &Plan,
+    resources: &Resources,
+    settings: Settings,
+    samples: u32,
+) -> Result<Rendered, Error> {
     let mut session = Session::new(gpu, plan, resources, settings, Some(samples))?;
     session.run(Until::Samples(samples), &mut |_| true)?;
     session.picture()

@@ -50,6 +50,9 @@ pub struct RenderFile {
     /// Its turn about +Y, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub env_rotate: Option<f64>,
+    /// Further layers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub aov: Vec<String>,
     /// `--set` values.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub set: IndexMap<String, SetValue>,
@@ -127,7 +130,14 @@ impl RenderFile {
 
     /// Makes relative files of a render file count from its folder, where they exist there.
     pub fn relative_to(&mut self, folder: &Path) {
-        let words = [&mut self.pipeline, &mut self.layout, &mut self.schedule, &mut self.precision, &mut self.scene, &mut self.env];
+        let words = [
+            &mut self.pipeline,
+            &mut self.layout,
+            &mut self.schedule,
+            &mut self.precision,
+            &mut self.scene,
+            &mut self.env,
+        ];
         for word in words.into_iter().flatten() {
             let beside = folder.join(word.as_str());
             if beside.is_file() {
@@ -157,6 +167,7 @@ impl RenderFile {
             env: over.env.or(self.env),
             env_scale: over.env_scale.or(self.env_scale),
             env_rotate: over.env_rotate.or(self.env_rotate),
+            aov: if over.aov.is_empty() { self.aov } else { over.aov },
             set,
             state: over.state.or(self.state),
             files,
@@ -198,12 +209,29 @@ impl RenderFile {
         })
     }
 
+    /// Replaces files by their config keys, so that the settings no longer depend on where they lay: their texts go into `files`.
+    pub fn pin(&mut self, selection: &Selection, library: &Library) {
+        self.files = library.own.iter().cloned().collect();
+        let axes = [
+            (&mut self.pipeline, &selection.pipeline),
+            (&mut self.layout, &selection.layout),
+            (&mut self.schedule, &selection.schedule),
+            (&mut self.precision, &selection.precision),
+        ];
+        for (word, key) in axes {
+            if self.files.contains_key(key) {
+                *word = Some(key.clone());
+            }
+        }
+    }
+
     /// As TOML, for the metadata of a picture.
     ///
     /// # Errors
     /// Failed, when a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, Error> {
-        toml::to_string_pretty(self).map_err(|error| Error::failed(format!("cannot write the settings as TOML: {error}")))
+        toml::to_string_pretty(self)
+            .map_err(|error| Error::failed(format!("cannot write the settings as TOML: {error}")))
     }
 }
 
@@ -213,7 +241,10 @@ mod tests {
 
     #[test]
     fn flags_win_and_sets_merge() {
-        let file = RenderFile::parse("pipeline = \"pt\"\nsize = [4, 2]\ncamera = 1\nset = { max_edges = 5, rr = true }", "a.toml");
+        let file = RenderFile::parse(
+            "pipeline = \"pt\"\nsize = [4, 2]\ncamera = 1\nset = { max_edges = 5, rr = true }",
+            "a.toml",
+        );
         let over = RenderFile {
             size: Some([8, 8]),
             set: IndexMap::from([("max_edges".to_owned(), SetValue::Text("9".to_owned()))]),

@@ -3,11 +3,20 @@
 use runtime::scene::{self, Accelerator, BuildPreset, LoadOptions, RESOURCES, Scene};
 use std::path::{Path, PathBuf};
 
+/// Deepest hierarchies that the traversal stacks of the kernels (32 and 64 entries) certainly hold: the wide one pushes up to
+/// two groups a level.
+const DEEPEST_WIDE: usize = 16;
+const DEEPEST_BINARY: usize = 64;
+
 /// Folder of the test scenes; they are not part of the repository.
 fn scenes() -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let candidates = [root.join("../shared/scenes"), root.join("../../shared/scenes")];
-    let found = std::env::var_os("PATHLOOM_SCENES").map(PathBuf::from).into_iter().chain(candidates).find(|folder| folder.is_dir());
+    let found = std::env::var_os("PATHLOOM_SCENES")
+        .map(PathBuf::from)
+        .into_iter()
+        .chain(candidates)
+        .find(|folder| folder.is_dir());
     if found.is_none() {
         println!("skipped: no folder with test scenes");
     }
@@ -85,7 +94,7 @@ fn every_scene_loads() {
     found.sort();
     let options = LoadOptions { build: BuildPreset::VeryFast, ..LoadOptions::default() };
     for file in found {
-        let scene = scene::load(&file, &options).unwrap_or_else(|error| panic!("{error}"));
+        let mut scene = scene::load(&file, &options).unwrap_or_else(|error| panic!("{error}"));
         check(&scene);
         let own = described(&file, "file").is_some_and(|name| file.ends_with(name));
         if let Some(triangles) = described(&file, "triangles").filter(|_| own) {
@@ -100,16 +109,27 @@ fn every_scene_loads() {
             stats.bvh.depth,
             stats.lights,
             stats.bytes / 1024,
-            stats.effects.iter().filter(|(_, effect)| effect.present).map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(" ")
+            stats
+                .effects
+                .iter()
+                .filter(|(_, effect)| effect.present)
+                .map(|(name, _)| name.as_str())
+                .collect::<Vec<_>>()
+                .join(" ")
         );
         stats.warnings.iter().for_each(|warning| println!("    {warning}"));
+        scene.set_accelerator(Accelerator::Bvh2);
+        let binary = scene.stats().bvh.depth;
+        println!("    binary depth {binary}");
+        assert!(stats.bvh.depth <= DEEPEST_WIDE && binary <= DEEPEST_BINARY);
     }
 }
 
 #[test]
 fn a_folder_is_its_scene_and_the_binary_hierarchy_is_built_on_demand() {
     let Some(folder) = scenes() else { return };
-    let mut scene = scene::load(&folder.join("cornell_box"), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let mut scene =
+        scene::load(&folder.join("cornell_box"), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((scene.triangle_count(), scene.size()), (36, (512, 512)));
     scene.set_accelerator(Accelerator::Bvh2);
     assert!(scene.resource("bvh_nodes").is_none());
@@ -121,7 +141,8 @@ fn a_folder_is_its_scene_and_the_binary_hierarchy_is_built_on_demand() {
 #[test]
 fn the_same_file_gives_the_same_bytes() {
     let Some(folder) = scenes() else { return };
-    let load = || scene::load(&folder.join("lights_lamp"), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let load =
+        || scene::load(&folder.join("lights_lamp"), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let (a, b) = (load(), load());
     RESOURCES.iter().for_each(|name| assert!(a.resource(name) == b.resource(name), "{name}"));
 }

@@ -43,14 +43,13 @@ impl Entries {
     pub(super) fn find(&self, name: &Spanned<String>) -> Result<&Entry, Diagnostic> {
         match self.functions.get(&name.value).map(Vec::as_slice) {
             Some([entry]) => Ok(entry),
-            Some([first, second, ..]) => Err(Diagnostic::error(
-                "K0208",
-                format!("there are two stage functions `{}`", name.value),
-            )
-            .at(name.span, "which of them?")
-            .also(first.span, "one here")
-            .also(second.span, "one here")
-            .help("rename one of them")),
+            Some([first, second, ..]) => {
+                Err(Diagnostic::error("K0208", format!("there are two stage functions `{}`", name.value))
+                    .at(name.span, "which of them?")
+                    .also(first.span, "one here")
+                    .also(second.span, "one here")
+                    .help("rename one of them"))
+            }
             _ => {
                 let help = match nearest(&name.value, self.functions.keys().map(String::as_str)) {
                     Some(near) => format!("did you mean `{near}`?"),

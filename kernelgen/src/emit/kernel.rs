@@ -104,8 +104,7 @@ fn push_instances(text: &mut String, stage: &WiredStage, access: &Access, import
 }
 
 fn call(stage: &WiredStage, imports: &mut Imports) -> String {
-    let arguments: Vec<String> =
-        stage.instances.iter().map(|(instance, _)| format!("&{instance}")).collect();
+    let arguments: Vec<String> = stage.instances.iter().map(|(instance, _)| format!("&{instance}")).collect();
     let call = format!("{}({})", stage.entry.name, arguments.join(", "));
     if stage.routes.is_empty() {
         return format!("_ = {call};");
@@ -128,8 +127,7 @@ fn enqueue(stage: &WiredStage, imports: &mut Imports) -> String {
         let constant = stage_constant(target);
         imports.add("outcome", outcomes.iter().map(String::as_str));
         imports.add("queue", [constant.as_str()]);
-        let tests: Vec<String> =
-            outcomes.iter().map(|outcome| format!("outcome == {outcome}")).collect();
+        let tests: Vec<String> = outcomes.iter().map(|outcome| format!("outcome == {outcome}")).collect();
         let _ = writeln!(text, "    enqueue({constant}, {}, path_id);", tests.join(" || "));
     }
     text
@@ -161,7 +159,21 @@ pub(super) fn consumer_kernel(kernel: &str, name: &str, stream: &WiredStream, wo
 /// Names that the generated kernels use themselves: no instance and no stream can have them.
 pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
     BTreeSet::from([
-        "index", "group", "groups", "lane", "outcome", "record", "path_id", "queue", "control", "film", "state",
-        "arguments", "path_count", "enqueue", "running", "pass_info",
+        "index",
+        "group",
+        "groups",
+        "lane",
+        "outcome",
+        "record",
+        "path_id",
+        "queue",
+        "control",
+        "film",
+        "state",
+        "arguments",
+        "path_count",
+        "enqueue",
+        "running",
+        "pass_info",
     ])
 }

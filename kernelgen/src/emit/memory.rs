@@ -51,10 +51,9 @@ fn address(table: &Table) -> String {
     match table.order {
         Order::Aos => format!("path_id * {}u + lane", table.lanes),
         Order::Soa => "lane * path_count + path_id".to_owned(),
-        Order::Aosoa(block) => format!(
-            "path_id / {block}u * {}u + lane * {block}u + path_id % {block}u",
-            table.lanes * block
-        ),
+        Order::Aosoa(block) => {
+            format!("path_id / {block}u * {}u + lane * {block}u + path_id % {block}u", table.lanes * block)
+        }
     }
 }
 
@@ -74,11 +73,7 @@ pub(super) struct Access {
 }
 
 /// The statements that move a kernel's leaves between tables and instances.
-pub(super) fn access(
-    placement: &Placement,
-    leaves: &BTreeMap<Leaf, StateLeaf>,
-    traffic: &KernelTraffic,
-) -> Access {
+pub(super) fn access(placement: &Placement, leaves: &BTreeMap<Leaf, StateLeaf>, traffic: &KernelTraffic) -> Access {
     let memory = Memory { placement, leaves, traffic, words: words(placement) };
     let mut access = Access::default();
     let loaded = memory.load_lanes(&mut access);
@@ -130,8 +125,8 @@ struct Loaded {
 enum WordStore {
     /// Nothing in it is live afterwards: any value will do.
     Free,
-    /// It must stay as it is.
-    Keep,
+    /// It must stay as it is; its value where the kernel has loaded it.
+    Keep(Option<String>),
     /// It gets this value.
     Value(String),
 }
@@ -204,11 +199,14 @@ impl Memory<'_> {
     }
 
     fn fill_leaves(&self, loaded: &Loaded, access: &mut Access) {
-        for leaf in &self.traffic.loads {
-            let (Some(slot), Some(declared)) = (self.placement.slots.get(leaf), self.leaves.get(leaf))
-            else {
-                continue;
-            };
+        let placed = self
+            .traffic
+            .loads
+            .iter()
+            .filter_map(|leaf| Some((leaf, self.placement.slots.get(leaf)?, self.leaves.get(leaf)?)));
+        let mut placed: Vec<_> = placed.collect();
+        placed.sort_by(|(_, a, _), (_, b, _)| (a.table, &a.words, a.shift).cmp(&(b.table, &b.words, b.shift)));
+        for (leaf, slot, declared) in placed {
             let bits = self.register(slot, loaded);
             let value = match declared.ty {
                 LeafType::U32 if slot.bits < 32 => {
@@ -225,11 +223,9 @@ impl Memory<'_> {
 
     /// The words of a slot as one value: a swizzle where they stand side by side in one lane.
     fn register(&self, slot: &Slot, loaded: &Loaded) -> String {
-        let lanes: Vec<(Lane, usize)> =
-            slot.words.iter().map(|&word| self.lane_of((slot.table, word))).collect();
+        let lanes: Vec<(Lane, usize)> = slot.words.iter().map(|&word| self.lane_of((slot.table, word))).collect();
         let (lane, first) = lanes[0];
-        let together =
-            lanes.iter().enumerate().all(|(step, place)| *place == (lane, first + step));
+        let together = lanes.iter().enumerate().all(|(step, place)| *place == (lane, first + step));
         match loaded.whole.get(&lane) {
             Some(local) if together && lanes.len() > 1 => {
                 let all = lanes.len() as u32 == self.table(slot.table).lane;
@@ -262,20 +258,18 @@ impl Memory<'_> {
         }
     }
 
-    /// Stores a lane as a whole if nothing in it must stay and at least half of it is new, else word by word.
+    /// Stores a lane as a whole if at least half of it is new and what must stay is in registers, else word by word.
     fn store_lane(&self, lane: Lane, loaded: &Loaded, access: &mut Access) {
         let table = self.table(lane.0);
         let buffer = buffer_name(table);
         let target = format!("{buffer}[{buffer}_address({}u)]", lane.1);
         access.buffers.insert(buffer);
         let first = lane.1 * table.lane;
-        let stores: Vec<WordStore> = (first..first + table.lane)
-            .map(|word| self.word_store((lane.0, word), loaded))
-            .collect();
+        let stores: Vec<WordStore> =
+            (first..first + table.lane).map(|word| self.word_store((lane.0, word), loaded)).collect();
         let values = stores.iter().filter(|store| matches!(store, WordStore::Value(_))).count();
-        let whole = !stores.iter().any(|store| matches!(store, WordStore::Keep))
-            && 2 * values >= stores.len();
-        if whole {
+        let lost = stores.iter().any(|store| matches!(store, WordStore::Keep(None)));
+        if !lost && 2 * values >= stores.len() {
             let value = self.lane_value(lane, &stores);
             access.stores.push(format!("{target} = {value};"));
             access.store_bytes += 4 * table.lane;
@@ -293,7 +287,8 @@ impl Memory<'_> {
         let Some(parts) = self.words.get(&word) else { return WordStore::Free };
         let keeps = self.keeps_any(parts);
         if !self.stores_any(parts) {
-            return if keeps { WordStore::Keep } else { WordStore::Free };
+            let value = || loaded.words.get(&word).cloned();
+            return if keeps { WordStore::Keep(value()) } else { WordStore::Free };
         }
         let old = if keeps { loaded.words.get(&word).map_or("0u", String::as_str) } else { "0u" };
         let mut value = old.to_owned();
@@ -328,10 +323,8 @@ impl Memory<'_> {
         while at < stores.len() {
             let word = (lane.0, first + at as u32);
             let (value, words) = match (self.whole_vector(word, stores.len() - at), &stores[at]) {
-                (Some((leaf, words)), WordStore::Value(_)) => {
-                    (format!("bitcast<vec{words}u>({leaf})"), words)
-                }
-                (_, WordStore::Value(value)) => (value.clone(), 1),
+                (Some((leaf, words)), WordStore::Value(_)) => (format!("bitcast<vec{words}u>({leaf})"), words),
+                (_, WordStore::Value(value) | WordStore::Keep(Some(value))) => (value.clone(), 1),
                 _ => ("0u".to_owned(), 1),
             };
             values.push(value);

@@ -15,9 +15,9 @@ mod text;
 mod wiring;
 
 use crate::analyze::{self, Leaf, Liveness};
+use crate::config;
 use crate::config::evaluate_rounds;
 use crate::config::model::{Selection, Variant};
-use crate::config;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::layout::{self, Placement, StateLeaf};
 use crate::link::Modules;
@@ -55,8 +55,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     let mut modules = modules_of(sources);
     let outcomes = add_config_modules(sources, &mut modules, &variant)?;
     let wiring = {
-        let texts =
-            Texts { sources, modules: &modules, constants: &constants, outcomes: &outcomes };
+        let texts = Texts { sources, modules: &modules, constants: &constants, outcomes: &outcomes };
         wiring::wire(texts, &variant)?
     };
     warnings.extend(wiring.warnings.iter().cloned());
@@ -183,20 +182,14 @@ fn leaves(variant: &Variant) -> BTreeMap<Leaf, StateLeaf> {
 }
 
 /// K0210: a leaf that some stage reads although no stage before it surely wrote it.
-fn check_initialised(
-    wiring: &Wiring,
-    liveness: &Liveness,
-    start: &str,
-) -> Result<(), Vec<Diagnostic>> {
+fn check_initialised(wiring: &Wiring, liveness: &Liveness, start: &str) -> Result<(), Vec<Diagnostic>> {
     let Some(traffic) = liveness.kernels.get(start) else { return Ok(()) };
-    let findings: Vec<Diagnostic> =
-        traffic.live_in.iter().map(|leaf| uninitialised(wiring, leaf, start)).collect();
+    let findings: Vec<Diagnostic> = traffic.live_in.iter().map(|leaf| uninitialised(wiring, leaf, start)).collect();
     if findings.is_empty() { Ok(()) } else { Err(findings) }
 }
 
 fn uninitialised(wiring: &Wiring, leaf: &Leaf, start: &str) -> Diagnostic {
-    let mut finding =
-        Diagnostic::error("K0210", format!("`{leaf}` can be read before it was ever written"));
+    let mut finding = Diagnostic::error("K0210", format!("`{leaf}` can be read before it was ever written"));
     let mut reading = wiring.stages.iter().filter_map(|(name, stage)| {
         let place = stage.facts.reads.get(leaf)?;
         Some((name, *place))

@@ -42,14 +42,8 @@ pub(super) fn build(
     modules: &mut Modules,
     program: &Program<'_>,
 ) -> Result<Built, Vec<Diagnostic>> {
-    let mut builder = Builder {
-        sources,
-        modules,
-        program,
-        kernels: Vec::new(),
-        effects_seen: BTreeSet::new(),
-        findings: Vec::new(),
-    };
+    let mut builder =
+        Builder { sources, modules, program, kernels: Vec::new(), effects_seen: BTreeSet::new(), findings: Vec::new() };
     let steps = builder.steps();
     if builder.findings.is_empty() { Ok(builder.finish(steps)) } else { Err(builder.findings) }
 }
@@ -106,8 +100,7 @@ impl Builder<'_> {
             }
         }
         if let Some(first) = queues.streams.first() {
-            let prepared: Vec<Prepared> =
-                queues.streams.iter().map(|stream| self.prepared_stream(stream)).collect();
+            let prepared: Vec<Prepared> = queues.streams.iter().map(|stream| self.prepared_stream(stream)).collect();
             self.prepare(&format!("prepare_{first}_stream"), &prepared, &mut body);
         }
         for stream in &queues.streams {
@@ -142,11 +135,7 @@ impl Builder<'_> {
 
     fn prepared_stream(&self, name: &str) -> Prepared {
         let stream = &self.program.wiring.streams[name];
-        Prepared {
-            constant: queue::stream_constant(name),
-            capacity: stream.capacity,
-            rays: stream.rays,
-        }
+        Prepared { constant: queue::stream_constant(name), capacity: stream.capacity, rays: stream.rays }
     }
 
     /// Adds a prepare kernel; the first of a round counts the round.
@@ -284,8 +273,7 @@ impl Builder<'_> {
             .map(|buffer| (buffer.name.clone(), buffer))
             .collect();
         for name in used {
-            let resource =
-                || Buffer { name: name.to_owned(), role: Role::Resource, size: Size::default() };
+            let resource = || Buffer { name: name.to_owned(), role: Role::Resource, size: Size::default() };
             buffers.entry(name.to_owned()).or_insert_with(resource);
         }
         buffers
@@ -312,10 +300,7 @@ impl Builder<'_> {
             let bytes = 4 * stream::record_words(stream) * stream.capacity;
             buffer(&stream::buffer_name(name), Role::Stream, per_path(bytes))
         }));
-        buffers.extend([
-            buffer("film", Role::Film, film),
-            buffer("pass_info", Role::Pass, fixed(32)),
-        ]);
+        buffers.extend([buffer("film", Role::Film, film), buffer("pass_info", Role::Pass, fixed(32))]);
         buffers
     }
 

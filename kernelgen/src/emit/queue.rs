@@ -5,16 +5,8 @@ use crate::config::model::{QueueKind, RayKind};
 use std::fmt::Write;
 
 /// Words of the control buffer before those of the queues, by name; all but the last are counters that the host reads.
-const WORDS: [&str; 8] = [
-    "rays_primary",
-    "rays_secondary",
-    "rays_deep",
-    "rays_visibility",
-    "rejected",
-    "overflow",
-    "unfinished",
-    "round",
-];
+const WORDS: [&str; 8] =
+    ["rays_primary", "rays_secondary", "rays_deep", "rays_visibility", "rejected", "overflow", "unfinished", "round"];
 
 /// The counters that the host reads, with their words.
 pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
@@ -242,6 +234,11 @@ pub(super) fn begin_kernel(start_rays: Option<RayKind>) -> String {
     )
 }
 
+/// A capacity as text.
+pub(super) fn multiple_of_path_count(factor: u32) -> String {
+    if factor == 1 { "path_count".to_owned() } else { format!("{factor}u * path_count") }
+}
+
 /// What a prepare kernel does for one queue.
 #[derive(Clone, Debug)]
 pub(super) struct Prepared {
@@ -265,10 +262,7 @@ pub(super) fn prepare_kernel(name: &str, first_of_round: bool, queues: &[Prepare
     }
     for prepared in queues {
         imports.add("queue", [prepared.constant.as_str()]);
-        let capacity = match prepared.capacity {
-            1 => "path_count".to_owned(),
-            factor => format!("{factor}u * path_count"),
-        };
+        let capacity = multiple_of_path_count(prepared.capacity);
         let call = format!("start_queue({}, {capacity})", prepared.constant);
         let _ = match prepared.rays {
             None => writeln!(body, "    {call};"),

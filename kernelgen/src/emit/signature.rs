@@ -17,9 +17,10 @@ pub(super) struct Signature {
 pub(super) fn signature(module: &Module, name: &str) -> Signature {
     let named = |(_, function): &(_, &naga::Function)| function.name.as_deref() == Some(name);
     let Some((_, function)) = module.functions.iter().find(named) else { return Signature::default() };
-    let params = function.arguments.iter().map(|argument| {
-        (argument.name.clone().unwrap_or_default(), record_of(module, argument.ty))
-    });
+    let params = function
+        .arguments
+        .iter()
+        .map(|argument| (argument.name.clone().unwrap_or_default(), record_of(module, argument.ty)));
     let result = function.result.as_ref().map(|result| &module.types[result.ty].inner);
     Signature {
         params: params.collect(),

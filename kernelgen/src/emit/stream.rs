@@ -1,6 +1,6 @@
 //! `package::streams`: what happens to a record that a stage pushes.
 
-use super::queue::stream_constant;
+use super::queue::{multiple_of_path_count, stream_constant};
 use super::text::{COMPONENTS, Imports};
 use super::wiring::{WiredStream, Wiring};
 use crate::config::model::{Pipeline, RayKind};
@@ -87,44 +87,47 @@ fn push_batched(imports: &mut Imports, body: &mut String, name: &str, record: &s
         "\n/// Records that wait for `{}`, a plane a word.\n\
          var<storage, read_write> {buffer}: array<u32>;\n\n\
          /// Records that the stream has room for: as many as a round can push.\n\
-         fn {capacity}() -> u32 {{\n    return {}u * path_count;\n}}\n",
-        stream.entry.name, stream.capacity
+         fn {capacity}() -> u32 {{\n    return {};\n}}\n",
+        stream.entry.name,
+        multiple_of_path_count(stream.capacity)
     );
     let _ = write!(
         body,
         "\n/// Keeps a record for the end of the round.\n\
          fn push_{name}(record: {record}) {{\n    \
+             let capacity = {capacity}();\n    \
              let index = append({constant});\n    \
-             if index >= {capacity}() {{\n        \
+             if index >= capacity {{\n        \
                  atomicAdd(&control[CONTROL_OVERFLOW], 1u);\n        \
                  return;\n    \
              }}\n"
     );
     for (value, plane) in stream.leaves.iter().flat_map(word_values).zip(0..) {
-        let _ = writeln!(body, "    {buffer}[{}] = {value};", plane_address(plane, &capacity));
+        let _ = writeln!(body, "    {buffer}[{}] = {value};", plane_address(plane));
     }
     let _ = write!(
         body,
         "}}\n\n/// Takes a record out.\n\
-         fn load_{name}(index: u32) -> {record} {{\n    var record: {record};\n"
+         fn load_{name}(index: u32) -> {record} {{\n    \
+             let capacity = {capacity}();\n    \
+             var record: {record};\n"
     );
     let mut plane = 0;
     for leaf in &stream.leaves {
         let words = leaf.ty.words();
-        let values: Vec<String> = (plane..plane + words)
-            .map(|plane| format!("{buffer}[{}]", plane_address(plane, &capacity)))
-            .collect();
+        let values: Vec<String> =
+            (plane..plane + words).map(|plane| format!("{buffer}[{}]", plane_address(plane))).collect();
         plane += words;
         let _ = writeln!(body, "    {} = {};", path_of(leaf), value_of(leaf.ty, &values));
     }
     body.push_str("    return record;\n}\n");
 }
 
-fn plane_address(plane: u32, capacity: &str) -> String {
+fn plane_address(plane: u32) -> String {
     match plane {
         0 => "index".to_owned(),
-        1 => format!("{capacity}() + index"),
-        _ => format!("{plane}u * {capacity}() + index"),
+        1 => "capacity + index".to_owned(),
+        _ => format!("{plane}u * capacity + index"),
     }
 }
 

@@ -152,15 +152,21 @@ impl Wirer<'_> {
     }
 
     fn keep_reached(&mut self, reached: &BTreeSet<String>) {
-        for (name, stage) in &self.variant.pipeline.stages {
+        let pipeline = &self.variant.pipeline;
+        // A stage that no route names at all was reported with the configs.
+        let routed = |name: &String| {
+            let routes = pipeline.stages.values().flat_map(|stage| stage.on.values());
+            routes.into_iter().any(|target| target.value == *name)
+        };
+        for (name, stage) in &pipeline.stages {
             if let Some(wired) = self.found.remove(name) {
                 self.wiring.stages.insert(name.clone(), wired);
-            } else if !reached.contains(name) && !self.has_absent_effect() {
-                let message = format!("no outcome leads to stage `{name}`");
+            } else if !reached.contains(name) && routed(name) && !self.has_absent_effect() {
+                let message = format!("no outcome that comes leads to stage `{name}`");
                 self.wiring.warnings.push(
                     Diagnostic::warning("K0205", message)
                         .at(stage.span, "not generated")
-                        .help(format!("route an outcome to it: `on.x = \"{name}\"`")),
+                        .help("the outcomes that are routed to it never come"),
                 );
             }
         }
@@ -184,9 +190,11 @@ impl Wirer<'_> {
         };
         let entry = self.entries.find(&stage.entry).map_err(|finding| vec![finding])?.clone();
         let (texts, variant) = (self.texts, self.variant);
-        let analysed = self.analyse(entry, |entry, signature| {
-            check_stage_signature(variant, name, stage, entry, signature, texts)
-        }, &instance_of)?;
+        let analysed = self.analyse(
+            entry,
+            |entry, signature| check_stage_signature(variant, name, stage, entry, signature, texts),
+            &instance_of,
+        )?;
         self.check_outcomes(name, stage, &analysed)?;
         let routes = analysed.facts.outcomes.keys().filter_map(|outcome| {
             let target = &stage.on.get(outcome)?.value;
@@ -232,12 +240,7 @@ impl Wirer<'_> {
         Ok(Analysed { entry, signature, facts, pruned })
     }
 
-    fn check_outcomes(
-        &mut self,
-        name: &str,
-        stage: &Stage,
-        analysed: &Analysed,
-    ) -> Result<(), Vec<Diagnostic>> {
+    fn check_outcomes(&mut self, name: &str, stage: &Stage, analysed: &Analysed) -> Result<(), Vec<Diagnostic>> {
         let mut findings = Vec::new();
         let returned = &analysed.facts.outcomes;
         for (outcome, place) in returned.iter().filter(|(outcome, _)| *outcome != "end") {
@@ -256,7 +259,9 @@ impl Wirer<'_> {
                     findings.push(
                         Diagnostic::error("K0209", message)
                             .at(target.span, "a queue cannot be filled while it is emptied")
-                            .help("loop inside the stage function, or route through a second stage with the same `entry`"),
+                            .help(
+                                "loop inside the stage function, or route through a second stage with the same `entry`",
+                            ),
                     );
                 }
                 Some(_) => {}
@@ -303,9 +308,8 @@ impl Wirer<'_> {
         let batched = variant.schedule.batch.iter().any(|batch| batch.value == name);
         let entry = self.entries.find(&stream.consumer).map_err(|finding| vec![finding])?.clone();
         let bind = |_: &str| Some(name.to_owned());
-        let analysed = self.analyse(entry, |entry, signature| {
-            check_consumer_signature(name, stream, entry, signature)
-        }, &bind)?;
+        let analysed =
+            self.analyse(entry, |entry, signature| check_consumer_signature(name, stream, entry, signature), &bind)?;
         check_consumer(name, stream, &analysed)?;
         let capacity = if batched { self.capacity(name)? } else { 0 };
         Ok(WiredStream {
@@ -345,11 +349,7 @@ fn read_leaves(variant: &Variant, name: &str, stream: &Stream, facts: &StageFact
     let Some(record) = variant.pipeline.records.get(&stream.record.value) else { return Vec::new() };
     let leaves = record.fields.iter().flat_map(|(field, declared)| {
         declared.quantity.leaves().into_iter().map(move |shape| StateLeaf {
-            leaf: Leaf {
-                instance: name.to_owned(),
-                field: field.clone(),
-                member: shape.member.map(str::to_owned),
-            },
+            leaf: Leaf { instance: name.to_owned(), field: field.clone(), member: shape.member.map(str::to_owned) },
             ty: shape.ty,
             bits: shape.bits,
         })
@@ -380,7 +380,8 @@ fn check_stage_signature(
                 Some(record) => format!("takes a `ptr<function, {record}>`"),
                 None => "is no pointer to a record in function space".to_owned(),
             };
-            let message = format!("parameter `{param}` of stage `{name}` {is}, but `{bound}` is a `{}`", declared.value);
+            let message =
+                format!("parameter `{param}` of stage `{name}` {is}, but `{bound}` is a `{}`", declared.value);
             findings.push(
                 Diagnostic::error("K0207", message)
                     .at(place(param), format!("should be `ptr<function, {}>`", declared.value))
@@ -445,18 +446,14 @@ fn no_instance(
         .help(help)
 }
 
-fn check_consumer_signature(
-    name: &str,
-    stream: &Stream,
-    entry: &Entry,
-    signature: &Signature,
-) -> Vec<Diagnostic> {
+fn check_consumer_signature(name: &str, stream: &Stream, entry: &Entry, signature: &Signature) -> Vec<Diagnostic> {
     let record = &stream.record.value;
     let mut findings = Vec::new();
     match signature.params.as_slice() {
         [(_, Some(taken))] if taken == record => {}
         [(_, Some(taken))] => {
-            let message = format!("the consumer of stream `{name}` takes a `{taken}`, but the stream carries `{record}`");
+            let message =
+                format!("the consumer of stream `{name}` takes a `{taken}`, but the stream carries `{record}`");
             findings.push(
                 Diagnostic::error("K0207", message)
                     .at(entry.span, format!("its parameter should be `ptr<function, {record}>`"))

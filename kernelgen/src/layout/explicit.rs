@@ -48,10 +48,8 @@ impl Rows<'_> {
             match first {
                 Some((other, before)) if other != table => {
                     let tables = &self.placement.tables;
-                    let message = format!(
-                        "a row cannot mix the tables `{}` and `{}`",
-                        tables[other].name, tables[table].name
-                    );
+                    let message =
+                        format!("a row cannot mix the tables `{}` and `{}`", tables[other].name, tables[table].name);
                     self.findings.push(
                         Diagnostic::error("K0408", message)
                             .at(field.span, format!("stored in table `{}`", tables[table].name))
@@ -90,8 +88,7 @@ impl Rows<'_> {
         if words == self.lane {
             return;
         }
-        let message =
-            format!("this row takes {words} words, but a lane has {}", self.lane);
+        let message = format!("this row takes {words} words, but a lane has {}", self.lane);
         let help = if words < self.lane {
             let holes = vec!["\"_\""; (self.lane - words) as usize].join(", ");
             format!("fill it with {holes} or a field of at most {} words", self.lane - words)
@@ -136,13 +133,7 @@ impl Rows<'_> {
     }
 
     /// Places the fields of one shared word and returns 1.
-    fn place_bits(
-        &mut self,
-        row: &PlacedRow,
-        fields: &[PlacedField],
-        table: usize,
-        word: u32,
-    ) -> u32 {
+    fn place_bits(&mut self, row: &PlacedRow, fields: &[PlacedField], table: usize, word: u32) -> u32 {
         let mut shift = 0;
         for field in fields {
             let width = match &field.field {
@@ -170,14 +161,7 @@ impl Rows<'_> {
     }
 
     /// Places one field below a word and returns its width.
-    fn place_field_bits(
-        &mut self,
-        field: &PlacedField,
-        name: &str,
-        table: usize,
-        word: u32,
-        shift: u32,
-    ) -> u32 {
+    fn place_field_bits(&mut self, field: &PlacedField, name: &str, table: usize, word: u32, shift: u32) -> u32 {
         let leaves = self.named(name);
         let [leaf] = leaves.as_slice() else {
             if leaves.is_empty() {
@@ -232,11 +216,8 @@ impl Rows<'_> {
     }
 
     fn unknown(&mut self, field: &PlacedField, name: &str) {
-        let names: Vec<String> = self
-            .all
-            .iter()
-            .map(|leaf| format!("{}.{}", leaf.leaf.instance, leaf.leaf.field))
-            .collect();
+        let names: Vec<String> =
+            self.all.iter().map(|leaf| format!("{}.{}", leaf.leaf.instance, leaf.leaf.field)).collect();
         let help = match nearest(name, names.iter().map(String::as_str)) {
             Some(near) => format!("did you mean \"{near}\"?"),
             None => "write \"instance.field\", or \"_\" for an unused word".to_owned(),
@@ -248,8 +229,7 @@ impl Rows<'_> {
     }
 
     fn check_missing(&mut self, layout: &Layout, needed: &[StateLeaf]) {
-        let missing: Vec<&StateLeaf> =
-            needed.iter().filter(|leaf| !self.places.contains_key(&leaf.leaf)).collect();
+        let missing: Vec<&StateLeaf> = needed.iter().filter(|leaf| !self.places.contains_key(&leaf.leaf)).collect();
         for leaf in missing {
             let size = if leaf.bits < 32 {
                 format!("[\"{}:{}\", \"_:{}\"]", leaf.leaf, leaf.bits, 32 - leaf.bits)

@@ -121,25 +121,18 @@ pub fn state_leaves(pipeline: &Pipeline) -> Vec<StateLeaf> {
 pub fn assign(variant: &Variant, liveness: &Liveness) -> Result<Placement, Vec<Diagnostic>> {
     let (pipeline, layout) = (&variant.pipeline, &variant.layout);
     let all = state_leaves(pipeline);
-    let needed: Vec<StateLeaf> = all
-        .iter()
-        .filter(|leaf| !layout.drop_dead || liveness.stored.contains(&leaf.leaf))
-        .cloned()
-        .collect();
+    let needed: Vec<StateLeaf> =
+        all.iter().filter(|leaf| !layout.drop_dead || liveness.stored.contains(&leaf.leaf)).cloned().collect();
     let tables = tables(pipeline, layout, &needed)?;
     if layout.place.is_empty() {
-        Ok(automatic::assign(tables, &needed))
+        Ok(automatic::assign(tables, &needed, liveness))
     } else {
         explicit::assign(tables, layout, &all, &needed)
     }
 }
 
 /// The tables without their lanes.
-fn tables(
-    pipeline: &Pipeline,
-    layout: &Layout,
-    needed: &[StateLeaf],
-) -> Result<Vec<Table>, Vec<Diagnostic>> {
+fn tables(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -> Result<Vec<Table>, Vec<Diagnostic>> {
     let listed: IndexMap<String, Vec<String>> = if layout.tables.is_empty() {
         IndexMap::from([("state".to_owned(), pipeline.state.keys().cloned().collect())])
     } else {
@@ -149,21 +142,11 @@ fn tables(
         };
         layout.tables.iter().map(names).collect()
     };
-    let table = |(name, instances)| Table {
-        name,
-        instances,
-        order: layout.order,
-        lane: layout.lane,
-        lanes: 0,
-    };
+    let table = |(name, instances)| Table { name, instances, order: layout.order, lane: layout.lane, lanes: 0 };
     Ok(listed.into_iter().map(table).collect())
 }
 
-fn check_instances(
-    pipeline: &Pipeline,
-    layout: &Layout,
-    needed: &[StateLeaf],
-) -> Result<(), Vec<Diagnostic>> {
+fn check_instances(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -> Result<(), Vec<Diagnostic>> {
     let mut findings = Vec::new();
     let mut seen = BTreeMap::new();
     for (table, instances) in &layout.tables {
@@ -182,11 +165,8 @@ fn check_instances(
             }
         }
     }
-    let unlisted: BTreeSet<&String> = needed
-        .iter()
-        .map(|leaf| &leaf.leaf.instance)
-        .filter(|instance| !seen.contains_key(*instance))
-        .collect();
+    let unlisted: BTreeSet<&String> =
+        needed.iter().map(|leaf| &leaf.leaf.instance).filter(|instance| !seen.contains_key(*instance)).collect();
     findings.extend(unlisted.into_iter().map(|instance| {
         Diagnostic::error("K0409", format!("instance `{instance}` is in no table"))
             .at(layout.span, "none of this layout's tables lists it")
@@ -195,11 +175,7 @@ fn check_instances(
     if findings.is_empty() { Ok(()) } else { Err(findings) }
 }
 
-fn unknown_instance(
-    pipeline: &Pipeline,
-    table: &str,
-    instance: &crate::source::Spanned<String>,
-) -> Diagnostic {
+fn unknown_instance(pipeline: &Pipeline, table: &str, instance: &crate::source::Spanned<String>) -> Diagnostic {
     let names = || pipeline.state.keys().map(String::as_str);
     let message = format!("table `{table}` lists `{}`, which is no instance", instance.value);
     let help = match nearest(&instance.value, names()) {

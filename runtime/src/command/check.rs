@@ -45,7 +45,8 @@ struct Outcome<'a> {
 /// User input, when a config is refused.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut library = Library::default();
-    let scenes = [("every effect", input::every_effect()?), ("cornell_box", input::load_scene(&RenderFile::default())?.effects)];
+    let scenes =
+        [("every effect", input::every_effect()?), ("cornell_box", input::load_scene(&RenderFile::default())?.effects)];
     let cases = cases(&mut library, &arguments.files, &scenes)?;
     let outcomes: Vec<Outcome> = cases
         .par_iter()
@@ -65,16 +66,22 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "configs": outcomes.iter().map(|outcome| outcome.json(&outcomes)).collect::<Vec<_>>(),
         }))?;
     } else {
-        let lines: Vec<String> = outcomes.iter().map(|outcome| format!("{:<8} {}", outcome.word(&outcomes), outcome.case.title())).collect();
+        let lines: Vec<String> =
+            outcomes.iter().map(|outcome| format!("{:<8} {}", outcome.word(&outcomes), outcome.case.title())).collect();
         print(&format!("{}\n{} checked, {} failed", lines.join("\n"), outcomes.len(), failed.len()))?;
     }
-    if failed.is_empty() { Ok(()) } else { Err(Error::input(format!("{} of {} combinations are refused", failed.len(), outcomes.len())).into()) }
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::input(format!("{} of {} combinations are refused", failed.len(), outcomes.len())).into())
+    }
 }
 
 impl Case {
     fn title(&self) -> String {
         let selection = &self.selection;
-        let axes = [&selection.pipeline, &selection.layout, &selection.schedule, &selection.precision].map(|key| stem(key));
+        let axes =
+            [&selection.pipeline, &selection.layout, &selection.schedule, &selection.precision].map(|key| stem(key));
         format!("{} ({})", axes.join(" x "), self.scene)
     }
 }
@@ -86,8 +93,14 @@ impl Outcome<'_> {
     }
 
     fn fits_elsewhere(&self, all: &[Outcome]) -> bool {
-        let about_layout = self.refusal.iter().flat_map(|refusal| &refusal.diagnostics).all(|diagnostic| diagnostic.code.starts_with("K04"));
-        let same = |other: &&Outcome| other.case.selection.layout == self.case.selection.layout && other.case.scene == self.case.scene;
+        let about_layout = self
+            .refusal
+            .iter()
+            .flat_map(|refusal| &refusal.diagnostics)
+            .all(|diagnostic| diagnostic.code.starts_with("K04"));
+        let same = |other: &&Outcome| {
+            other.case.selection.layout == self.case.selection.layout && other.case.scene == self.case.scene
+        };
         self.case.placed && about_layout && all.iter().filter(same).any(|other| other.refusal.is_none())
     }
 
@@ -101,7 +114,8 @@ impl Outcome<'_> {
 
     fn json(&self, all: &[Outcome]) -> serde_json::Value {
         let selection = &self.case.selection;
-        let codes: Vec<_> = self.refusal.iter().flat_map(|refusal| &refusal.diagnostics).map(|diagnostic| diagnostic.code).collect();
+        let codes: Vec<_> =
+            self.refusal.iter().flat_map(|refusal| &refusal.diagnostics).map(|diagnostic| diagnostic.code).collect();
         json!({
             "pipeline": stem(&selection.pipeline),
             "layout": stem(&selection.layout),
@@ -147,7 +161,8 @@ fn cases(library: &mut Library, files: &[String], scenes: &[(&'static str, Effec
 
 fn of_file(library: &mut Library, file: &str) -> Result<Vec<Selection>, Error> {
     let path = Path::new(file);
-    let text = std::fs::read_to_string(path).map_err(|error| Error::input(format!("cannot read the file: {error}")).in_file(path))?;
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Error::input(format!("cannot read the file: {error}")).in_file(path))?;
     let axis = axis_of(path, &text);
     if axis == Axis::Render {
         let mut settings = RenderFile::parse(&text, file)?;
@@ -187,7 +202,9 @@ fn product(library: &Library, fixed: Option<(Axis, String)>) -> Vec<Selection> {
     let [pipelines, layouts, schedules, precisions] = keys;
     let given = |key: &String| fixed.as_ref().is_some_and(|(_, fixed)| fixed == key);
     let mut all = Vec::new();
-    for pipeline in pipelines.iter().filter(|key| given(key) || any_in_chain(library, key, &|table| table.contains_key("start"))) {
+    for pipeline in
+        pipelines.iter().filter(|key| given(key) || any_in_chain(library, key, &|table| table.contains_key("start")))
+    {
         for layout in &layouts {
             for schedule in &schedules {
                 for precision in &precisions {

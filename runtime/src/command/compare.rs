@@ -24,7 +24,7 @@ pub struct Arguments {
     #[arg(short, long, value_name = "DIFF.png")]
     output: Option<PathBuf>,
     /// Side of the blocks of the z-scores, pixels
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     block: u32,
     /// Print one JSON object
     #[arg(long)]
@@ -58,11 +58,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.json {
         let mut object = main.json();
         if !against.is_empty() {
-            object["reference"] = against.iter().map(|(name, comparison)| ((*name).to_owned(), comparison.json())).collect();
+            object["reference"] =
+                against.iter().map(|(name, comparison)| ((*name).to_owned(), comparison.json())).collect();
         }
         print_json(&object)?;
     } else {
-        let lines: Vec<String> = std::iter::once(&main).chain(against.iter().map(|(_, comparison)| comparison)).map(Comparison::text).collect();
+        let lines: Vec<String> = std::iter::once(&main)
+            .chain(against.iter().map(|(_, comparison)| comparison))
+            .map(Comparison::text)
+            .collect();
         print(&lines.join("\n"))?;
     }
     Ok(())
@@ -95,7 +99,8 @@ impl Comparison {
 
     fn text(&self) -> String {
         let metrics = &self.metrics;
-        let ratio = metrics.mean_ratio.map(|ratio| ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.5}"))).join(" ");
+        let ratio =
+            metrics.mean_ratio.map(|ratio| ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.5}"))).join(" ");
         let z = match (self.largest_z, self.blocks) {
             (Some(z), Some(blocks)) => format!("{z:.2} in {blocks} blocks of three channels"),
             _ => "unknown: neither image has sem layers (`render --aov variance`)".to_owned(),

@@ -52,7 +52,8 @@ fn name(generated: &Generated) -> String {
 }
 
 fn write(folder: &Path, generated: &Generated) -> Result<Vec<PathBuf>, Error> {
-    std::fs::create_dir_all(folder).map_err(|error| Error::failed(format!("cannot create the folder: {error}")).in_file(folder))?;
+    std::fs::create_dir_all(folder)
+        .map_err(|error| Error::failed(format!("cannot create the folder: {error}")).in_file(folder))?;
     let mut files = Vec::new();
     let mut file = |name: String, text: &str| {
         let path = folder.join(name);

@@ -9,6 +9,7 @@ use runtime::error::Error;
 use runtime::scene::Stats;
 use runtime::settings::RenderFile;
 use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 use wgpu::Features;
 
 /// Without `--scene`: adapters, and the configs and scenes that come with the program.
@@ -38,7 +39,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return scene(arguments);
     }
     let found: Vec<Value> = adapters(false).iter().map(adapter).collect();
-    let shipped: Vec<(&str, Vec<&str>)> = Axis::VARIANT.iter().chain([&Axis::Render]).map(|axis| (axis.folder(), axis.names())).collect();
+    let shipped: Vec<(&str, Vec<&str>)> =
+        Axis::VARIANT.iter().chain([&Axis::Render]).map(|axis| (axis.folder(), axis.names())).collect();
     if arguments.json {
         let mut object = json!({ "adapters": found, "scenes": scene_names() });
         for (folder, names) in &shipped {
@@ -61,7 +63,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn adapter(adapter: &wgpu::Adapter) -> Value {
     let (info, limits, features) = (adapter.get_info(), adapter.limits(), adapter.features());
-    let has: serde_json::Map<_, _> = FEATURES.iter().map(|(name, feature)| ((*name).to_owned(), json!(features.contains(*feature)))).collect();
+    let has: serde_json::Map<_, _> =
+        FEATURES.iter().map(|(name, feature)| ((*name).to_owned(), json!(features.contains(*feature)))).collect();
     json!({
         "name": info.name,
         "kind": format!("{:?}", info.device_type),
@@ -100,7 +103,11 @@ fn adapter_text(adapter: &Value) -> String {
 
 fn scene(arguments: &Arguments) -> Result<(), Failure> {
     let settings = arguments.scene.over(RenderFile::default());
-    let stats = input::load_scene(&settings)?.stats();
+    let mut stats = input::load_scene(&settings)?.stats();
+    if let Some(name) = settings.scene.filter(|word| !Path::new(word).exists()) {
+        stats.file = shipped(&name, &stats.file);
+        stats.sky = stats.sky.map(|sky| shipped(&name, &sky));
+    }
     if arguments.json {
         let failed = |error: serde_json::Error| Error::failed(format!("cannot write the numbers as JSON: {error}"));
         print_json(&serde_json::to_value(&stats).map_err(failed)?)?;
@@ -108,6 +115,11 @@ fn scene(arguments: &Arguments) -> Result<(), Failure> {
         print(&scene_text(&stats))?;
     }
     Ok(())
+}
+
+/// Where a file of a shipped scene comes from; it was unpacked to a place that is gone by now.
+fn shipped(name: &str, file: &Path) -> PathBuf {
+    Path::new("configs/scenes").join(name).join(file.file_name().unwrap_or_default())
 }
 
 fn scene_text(stats: &Stats) -> String {

@@ -50,7 +50,7 @@ pub struct SceneArguments {
     #[arg(long, value_name = "FILE", help_heading = "Scene")]
     pub env: Option<String>,
     /// Factor on the sky's radiance
-    #[arg(long, value_name = "X", value_parser = non_negative, help_heading = "Scene")]
+    #[arg(long, value_name = "X", value_parser = non_negative, allow_negative_numbers = true, help_heading = "Scene")]
     pub env_scale: Option<f64>,
     /// Turn of the sky about +Y, degrees
     #[arg(long, value_name = "DEG", value_parser = finite, allow_negative_numbers = true, help_heading = "Scene")]
@@ -125,8 +125,10 @@ pub fn variant(word: Option<&str>) -> Result<RenderFile, Error> {
             None => Ok(of_pipeline(word)),
         };
     }
-    let text = std::fs::read_to_string(path).map_err(|error| Error::input(format!("cannot read the file: {error}")).in_file(path))?;
-    let names_a_pipeline = text.parse::<toml::Table>().is_ok_and(|table| table.get("pipeline").is_some_and(toml::Value::is_str));
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Error::input(format!("cannot read the file: {error}")).in_file(path))?;
+    let names_a_pipeline =
+        text.parse::<toml::Table>().is_ok_and(|table| table.get("pipeline").is_some_and(toml::Value::is_str));
     if !names_a_pipeline {
         return Ok(of_pipeline(word));
     }
@@ -163,7 +165,8 @@ fn again(mut settings: RenderFile) -> RenderFile {
 impl VariantArguments {
     /// Puts the flags over the settings of a file.
     pub fn over(&self, settings: RenderFile) -> RenderFile {
-        let set: IndexMap<_, _> = self.set.iter().map(|(key, value)| (key.clone(), SetValue::Text(value.clone()))).collect();
+        let set: IndexMap<_, _> =
+            self.set.iter().map(|(key, value)| (key.clone(), SetValue::Text(value.clone()))).collect();
         settings.overlaid(RenderFile {
             layout: self.layout.clone(),
             schedule: self.schedule.clone(),
@@ -180,7 +183,8 @@ impl SceneArguments {
         if self.scene.is_some() && self.scene != settings.scene {
             settings.camera = None;
         }
-        let camera = self.camera.as_ref().map(|word| word.parse().map_or_else(|_| Camera::Name(word.clone()), Camera::Index));
+        let camera =
+            self.camera.as_ref().map(|word| word.parse().map_or_else(|_| Camera::Name(word.clone()), Camera::Index));
         settings.overlaid(RenderFile {
             scene: self.scene.clone(),
             camera,
@@ -243,7 +247,8 @@ pub fn with_default_scene(mut settings: RenderFile) -> RenderFile {
 /// # Errors
 /// Refused, with the generator's diagnostics.
 pub fn generate(sources: &Sources, selection: &Selection) -> Result<Generated, Failure> {
-    let generated = kernelgen::generate(sources, selection).map_err(|refusal| Failure::Refused(refusal.render(colour())))?;
+    let generated =
+        kernelgen::generate(sources, selection).map_err(|refusal| Failure::Refused(refusal.render(colour())))?;
     if !generated.warnings.is_empty() {
         say(kernelgen::diagnostic::render(&generated.warnings, &generated.sources, colour()).trim_end());
     }
@@ -257,6 +262,6 @@ pub fn generate(sources: &Sources, selection: &Selection) -> Result<Generated, F
 pub fn generate_settings(settings: &mut RenderFile, effects: Effects) -> Result<Generated, Failure> {
     let mut library = Library::default();
     let selection = settings.selection(&mut library, effects)?;
-    settings.files = library.own.iter().cloned().collect();
+    settings.pin(&selection, &library);
     generate(&library.sources, &selection)
 }

@@ -30,19 +30,19 @@ pub struct Arguments {
     #[command(flatten)]
     device: DeviceArguments,
     /// Samples per pixel, with --resume those of the picture included
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), group = "until")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true, group = "until")]
     spp: Option<u32>,
     /// Render for this long
-    #[arg(long, value_name = "SECONDS", value_parser = input::positive, group = "until")]
+    #[arg(long, value_name = "SECONDS", value_parser = input::positive, allow_negative_numbers = true, group = "until")]
     time: Option<f64>,
     /// Render until the root mean square of the standard errors is this part of the mean radiance
-    #[arg(long, value_name = "RELATIVE", value_parser = input::positive, group = "until")]
+    #[arg(long, value_name = "RELATIVE", value_parser = input::positive, allow_negative_numbers = true, group = "until")]
     error: Option<f64>,
     /// Seed of the random numbers; equal seeds give equal samples
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u32>,
     /// Path slots; more fill larger cards, fewer need less memory
-    #[arg(long, value_name = "N", help_heading = "Device")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Device")]
     paths: Option<u32>,
     /// Continue a picture where it was stopped
     #[arg(long, value_name = "PICTURE.exr", conflicts_with_all = ["scene", "camera", "size", "env", "env_scale", "env_rotate", "seed", "set"])]
@@ -69,9 +69,9 @@ pub struct Arguments {
 /// # Errors
 /// User input, refused variants, failed devices.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let variance = wants_variance(&arguments.aov)?;
     let earlier = arguments.resume.as_deref().map(input::of_picture).transpose()?;
     let mut settings = chosen(arguments, earlier.as_ref().map(|(settings, _)| settings))?;
+    let variance = wants_variance(&settings.aov)?;
     let until = until(arguments, &settings);
     let output = output(arguments, &settings)?;
 
@@ -101,14 +101,28 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     result?;
 
     let rendered = session.picture()?;
-    let keep_errors = variance || earlier.as_ref().is_some_and(|(_, image)| image.standard_error.is_some());
     let metadata = metadata(&settings, &rendered, until);
-    let outputs = write(&output, &rendered, &metadata, keep_errors, arguments.exposure)?;
+    let outputs = write(&output, &rendered, &metadata, variance, arguments.exposure)?;
     if progress::interrupted() {
-        say(&format!("stopped at {} samples per pixel; continue with `pathloom render --resume {}`", rendered.totals.samples, output.display()));
+        say(&format!(
+            "stopped at {} samples per pixel; continue with `pathloom render --resume {}`",
+            rendered.totals.samples,
+            output.display()
+        ));
     }
-    let summary = Summary { rendered: &rendered, generated: &generated, gpu: &gpu, settings: &metadata, outputs: &outputs, profile: arguments.profile };
-    if arguments.json { print_json(&summary.json()?)? } else { print(&summary.text()?)? }
+    let summary = Summary {
+        rendered: &rendered,
+        generated: &generated,
+        gpu: &gpu,
+        settings: &metadata,
+        outputs: &outputs,
+        profile: arguments.profile,
+    };
+    if arguments.json {
+        print_json(&summary.json()?)?
+    } else {
+        print(&summary.text()?)?
+    }
     Ok(())
 }
 
@@ -120,7 +134,10 @@ fn accelerator(plan: &Plan) -> Accelerator {
 
 fn wants_variance(layers: &[String]) -> Result<bool, Error> {
     match layers.iter().find(|layer| *layer != "variance") {
-        Some(other) => Err(Error::input(format!("--aov {other}: there is no such layer")).help("the one layer for now is `variance`")),
+        Some(other) => {
+            Err(Error::input(format!("--aov {other}: there is no such layer"))
+                .help("the one layer for now is `variance`"))
+        }
         None => Ok(!layers.is_empty()),
     }
 }
@@ -132,6 +149,9 @@ fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>) -> Result<RenderF
     };
     let mut settings = arguments.scene.over(arguments.axes.over(file));
     settings.seed = arguments.seed.or(settings.seed);
+    if !arguments.aov.is_empty() {
+        settings.aov.clone_from(&arguments.aov);
+    }
     Ok(input::with_default_scene(settings.with_defaults()))
 }
 
@@ -147,12 +167,15 @@ fn output(arguments: &Arguments, settings: &RenderFile) -> Result<PathBuf, Error
     let path = match (&arguments.output, &arguments.resume) {
         (Some(path), _) | (None, Some(path)) => path.clone(),
         (None, None) => {
-            let stem = |word: &Option<String>| Path::new(word.as_deref().unwrap_or("")).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let stem = |word: &Option<String>| {
+                Path::new(word.as_deref().unwrap_or("")).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+            };
             PathBuf::from(format!("{}_{}.exr", stem(&settings.scene), stem(&settings.pipeline)))
         }
     };
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("exr")) {
-        return Err(Error::input(format!("the output `{}` is not called .exr", path.display())).help("the PNG is written beside it by itself"));
+        return Err(Error::input(format!("the output `{}` is not called .exr", path.display()))
+            .help("the PNG is written beside it by itself"));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
@@ -161,7 +184,13 @@ fn output(arguments: &Arguments, settings: &RenderFile) -> Result<PathBuf, Error
     Ok(path)
 }
 
-fn resume(session: &mut Session, before: &RenderFile, image: &Image, until: Until, variance: bool) -> Result<(), Error> {
+fn resume(
+    session: &mut Session,
+    before: &RenderFile,
+    image: &Image,
+    until: Until,
+    variance: bool,
+) -> Result<(), Error> {
     let state = before.state.ok_or_else(|| Error::input("the picture does not say how many samples it has"))?;
     if let Until::Samples(wanted) = until
         && wanted <= state.samples
@@ -169,8 +198,10 @@ fn resume(session: &mut Session, before: &RenderFile, image: &Image, until: Unti
         let error = Error::input(format!("the picture already has {} samples per pixel", state.samples));
         return Err(error.help(format!("ask for more in total, `--spp {}`", u64::from(state.samples) * 2)));
     }
-    if image.standard_error.is_none() && (variance || matches!(until, Until::Error(_))) {
-        return Err(Error::input("the picture has no standard errors to continue").help("render it with `--aov variance`"));
+    if image.standard_error.is_none() && state.batches > 1 && (variance || matches!(until, Until::Error(_))) {
+        return Err(
+            Error::input("the picture has no standard errors to continue").help("render it with `--aov variance`")
+        );
     }
     session.resume(&image.totals(state.samples, state.batches))
 }
@@ -186,7 +217,13 @@ fn metadata(settings: &RenderFile, rendered: &Rendered, until: Until) -> RenderF
     settings
 }
 
-fn write(path: &Path, rendered: &Rendered, metadata: &RenderFile, errors: bool, exposure: Option<f64>) -> Result<Vec<PathBuf>, Error> {
+fn write(
+    path: &Path,
+    rendered: &Rendered,
+    metadata: &RenderFile,
+    errors: bool,
+    exposure: Option<f64>,
+) -> Result<Vec<PathBuf>, Error> {
     let standard_error = if errors { rendered.standard_error.clone() } else { None };
     if errors && standard_error.is_none() {
         super::warn("one sample per pixel gives no standard errors: no `sem` layers are written");
@@ -207,4 +244,3 @@ fn write(path: &Path, rendered: &Rendered, metadata: &RenderFile, errors: bool, 
     write_png(&png, rendered.size, &to_srgb(&rendered.mean, exposure.factor(&rendered.mean)))?;
     Ok(vec![path.to_path_buf(), png])
 }
-

@@ -89,7 +89,13 @@ impl Summary<'_> {
         let counters = &rendered.counters;
         let [width, height] = rendered.size;
         writeln!(out, "picture       {width}x{height}, {} samples per pixel", rendered.totals.samples)?;
-        writeln!(out, "time          {:.2} s, {:.2} Msamples/s on {}", rendered.seconds, self.msamples_per_second(), self.gpu.info.name)?;
+        writeln!(
+            out,
+            "time          {:.2} s, {:.2} Msamples/s on {}",
+            rendered.seconds,
+            self.msamples_per_second(),
+            self.gpu.info.name
+        )?;
         let rates = rendered.profile.mrays_per_second(counters, rendered.seconds);
         let kinds = [
             ("primary", counters.primary, rates.primary),

@@ -46,7 +46,8 @@ fn flip(image: &Image, reference: &Image) -> nv_flip::FlipImageFloat {
 }
 
 fn mean_ratio(image: &Image, reference: &Image, channel: usize) -> Option<f64> {
-    let sum = |image: &Image| image.radiance.iter().skip(channel).step_by(3).map(|&value| f64::from(value)).sum::<f64>();
+    let sum =
+        |image: &Image| image.radiance.iter().skip(channel).step_by(3).map(|&value| f64::from(value)).sum::<f64>();
     let below = sum(reference);
     (below > 0.0).then(|| sum(image) / below)
 }

@@ -29,7 +29,7 @@ pub fn check(first: (&str, &Image), second: (&str, &Image)) -> Result<(), Error>
 
 fn finite(name: &str, image: &Image) -> Result<(), Error> {
     let bad = |value: &f32| !value.is_finite();
-    let Some(first) = image.radiance.iter().position(|value| bad(value)) else { return Ok(()) };
+    let Some(first) = image.radiance.iter().position(bad) else { return Ok(()) };
     let count = image.radiance.iter().filter(|value| bad(value)).count();
     let pixel = first / 3;
     let (x, y) = (pixel % image.size[0] as usize, pixel / image.size[0] as usize);

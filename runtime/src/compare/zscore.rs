@@ -53,7 +53,8 @@ fn score(a: &Image, b: &Image, corner: [u32; 2], end: [u32; 2], channel: usize) 
             let at = (y as usize * a.size[0] as usize + x as usize) * 3 + channel;
             let (first, second) = (f64::from(a.radiance[at]), f64::from(b.radiance[at]));
             difference += first - second;
-            variance += error(a, at).powi(2) + error(b, at).powi(2) + (ROUNDING * first.abs().max(second.abs())).powi(2);
+            variance +=
+                error(a, at).powi(2) + error(b, at).powi(2) + (ROUNDING * first.abs().max(second.abs())).powi(2);
         }
     }
     if difference == 0.0 { 0.0 } else { difference / variance.sqrt() }

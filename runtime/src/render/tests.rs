@@ -3,7 +3,6 @@
 use super::*;
 use crate::device::DeviceOptions;
 use crate::film::Sums;
-use std::borrow::Cow;
 use kernelgen::config::model::{Accumulate, RayKind};
 use kernelgen::plan::{Access, Binding, Buffer, Counter, Kernel, Needs, Size, Step};
 
@@ -38,7 +37,9 @@ fn kernel(name: &str, text: String, bindings: &[(usize, Access)], rays: Option<R
         entry: format!("{name}_main"),
         module: format!("{HEADER}{text}"),
         uses_path_count: true,
-        bindings: bindings.map(|(binding, &(buffer, access))| Binding { binding: binding as u32, buffer, access }).collect(),
+        bindings: bindings
+            .map(|(binding, &(buffer, access))| Binding { binding: binding as u32, buffer, access })
+            .collect(),
         workgroup: 64,
         stages: Vec::new(),
         load_bytes: 0,
@@ -54,7 +55,11 @@ fn plan(film: Accumulate) -> Plan {
     } else {
         ("f32", "atomicAdd(&film[word], value);", 12)
     };
-    let buffer = |name: &str, role, fixed, per_path, per_pixel| Buffer { name: name.to_owned(), role, size: Size { fixed, per_path, per_pixel } };
+    let buffer = |name: &str, role, fixed, per_path, per_pixel| Buffer {
+        name: name.to_owned(),
+        role,
+        size: Size { fixed, per_path, per_pixel },
+    };
     let film_text = format!(
         "@group(0) @binding(2) var<storage, read_write> film: array<atomic<{ty}>>;\nfn add(word: u32, value: f32) {{ {add} }}"
     );
@@ -104,7 +109,7 @@ fn gpu() -> Gpu {
     Gpu::open(&DeviceOptions::default()).expect("an adapter")
 }
 
-fn nothing<'a>(_: &str) -> Option<Cow<'a, [u8]>> {
+fn nothing<'a>(_: &str) -> Option<&'a [u8]> {
     None
 }
 
@@ -173,7 +178,8 @@ fn rates_come_from_measured_passes() {
 fn what_does_not_fit_is_refused() {
     let gpu = gpu();
     let plan = plan(Accumulate::AtomicF32);
-    let error = Session::new(&gpu, &plan, &nothing, Settings { size: [0, 4], ..settings(1024) }, None).expect_err("empty");
+    let error =
+        Session::new(&gpu, &plan, &nothing, Settings { size: [0, 4], ..settings(1024) }, None).expect_err("empty");
     assert_eq!(error.exit_code(), 2);
     let error = Session::new(&gpu, &plan, &nothing, settings(0), None).expect_err("no paths");
     assert!(error.to_string().contains("--paths 0"));

@@ -17,7 +17,11 @@ struct Strided<'a> {
 ///
 /// # Errors
 /// Another element type than `dimensions`, or data outside its buffer view or buffer.
-pub fn floats<const N: usize>(document: &Document, accessor: &Accessor<'_>, dimensions: Dimensions) -> Result<Vec<[f32; N]>> {
+pub fn floats<const N: usize>(
+    document: &Document,
+    accessor: &Accessor<'_>,
+    dimensions: Dimensions,
+) -> Result<Vec<[f32; N]>> {
     debug_assert_eq!(dimensions.multiplicity(), N);
     decode(document, accessor, dimensions, component_scale(accessor))
 }
@@ -32,13 +36,20 @@ pub fn indices(document: &Document, accessor: &Accessor<'_>) -> Result<Vec<u32>>
         let message = format!("indices have the component type {:?}", accessor.data_type());
         return Err(Error::input(message).at(at()).help("unsigned byte, short or int"));
     }
-    let (values, _) = expect(accessor, Dimensions::Scalar).and_then(|()| raw(document, accessor, 1)).map_err(|e| e.at(at()))?;
+    let (values, _) =
+        expect(accessor, Dimensions::Scalar).and_then(|()| raw(document, accessor, 1)).map_err(|e| e.at(at()))?;
     Ok(values.into_iter().map(|value| value as u32).collect())
 }
 
-fn decode<const N: usize>(document: &Document, accessor: &Accessor<'_>, dimensions: Dimensions, scale: Option<f64>) -> Result<Vec<[f32; N]>> {
+fn decode<const N: usize>(
+    document: &Document,
+    accessor: &Accessor<'_>,
+    dimensions: Dimensions,
+    scale: Option<f64>,
+) -> Result<Vec<[f32; N]>> {
     let at = || format!("accessor {}", accessor.index());
-    let (values, _) = expect(accessor, dimensions).and_then(|()| raw(document, accessor, N)).map_err(|error| error.at(at()))?;
+    let (values, _) =
+        expect(accessor, dimensions).and_then(|()| raw(document, accessor, N)).map_err(|error| error.at(at()))?;
     let convert = |value: f64| match scale {
         Some(scale) => (value / scale).max(-1.0) as f32,
         None => value as f32,
@@ -118,10 +129,17 @@ fn overwrite(
     Ok(())
 }
 
-fn strided<'a>(document: &'a Document, view: &gltf::buffer::View<'_>, offset: usize, count: usize, size: usize) -> Result<Strided<'a>> {
+fn strided<'a>(
+    document: &'a Document,
+    view: &gltf::buffer::View<'_>,
+    offset: usize,
+    count: usize,
+    size: usize,
+) -> Result<Strided<'a>> {
     let bytes = view_bytes(document, view)?;
     let stride = view.stride().filter(|&stride| stride > 0).unwrap_or(size);
-    let end = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size)?.checked_add(offset));
+    let end =
+        count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size)?.checked_add(offset));
     match end.filter(|&end| end <= bytes.len()) {
         Some(_) => Ok(Strided { bytes: bytes.get(offset..).unwrap_or(&[]), stride }),
         None => Err(Error::input(format!(
@@ -139,7 +157,13 @@ fn strided<'a>(document: &'a Document, view: &gltf::buffer::View<'_>, offset: us
 pub fn view_bytes<'a>(document: &'a Document, view: &gltf::buffer::View<'_>) -> Result<&'a [u8]> {
     let buffer = &document.buffers[view.buffer().index()];
     view.offset().checked_add(view.length()).and_then(|end| buffer.get(view.offset()..end)).ok_or_else(|| {
-        let message = format!("{} bytes from byte {} on exceed buffer {} of {} bytes", view.length(), view.offset(), view.buffer().index(), buffer.len());
+        let message = format!(
+            "{} bytes from byte {} on exceed buffer {} of {} bytes",
+            view.length(),
+            view.offset(),
+            view.buffer().index(),
+            buffer.len()
+        );
         Error::input(message).at(format!("buffer view {}", view.index()))
     })
 }

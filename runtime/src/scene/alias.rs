@@ -67,7 +67,8 @@ mod tests {
 
     #[test]
     fn table_reproduces_its_probabilities() {
-        let weights: Vec<f64> = (0..1000).map(|i| if i % 7 == 0 { 0.0 } else { f64::from(i * i % 113) + 1e-9 }).collect();
+        let weights: Vec<f64> =
+            (0..1000).map(|i| if i % 7 == 0 { 0.0 } else { f64::from(i * i % 113) + 1e-9 }).collect();
         let probabilities = probabilities(&weights);
         assert!((sum(&probabilities) - 1.0).abs() < 1e-14);
         for (p, q) in probabilities.iter().zip(picked(&table(&probabilities))) {

@@ -122,7 +122,10 @@ fn cwbvh(boxes: &[Aabb], parameters: BvhBuildParams, exponent: i32) -> Bvh {
     let wide = bvh2_to_cwbvh(&binary, parameters.max_prims_per_leaf.clamp(1, 3), true, false);
     let nodes: Vec<CwBvhNode> = wide.nodes.iter().map(|node| unscaled(node, exponent)).collect();
     Bvh {
-        words: bytemuck::cast_slice::<CwBvhNode, u8>(&nodes).chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
+        words: bytemuck::cast_slice::<CwBvhNode, u8>(&nodes)
+            .chunks_exact(4)
+            .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect(),
         order: wide.primitive_indices,
         nodes: nodes.len(),
         depth: wide_depth(&nodes),
@@ -166,7 +169,12 @@ fn empty_bvh2() -> Bvh {
 
 /// Lays the nodes out depth first, and the triangles in the order of their leaves.
 fn pack_bvh2(bvh: &Bvh2, scale: f32) -> Bvh {
-    let mut out = Bvh { words: Vec::with_capacity(bvh.nodes.len() * 8), order: Vec::with_capacity(bvh.primitive_indices.len()), nodes: 1, depth: 1 };
+    let mut out = Bvh {
+        words: Vec::with_capacity(bvh.nodes.len() * 8),
+        order: Vec::with_capacity(bvh.primitive_indices.len()),
+        nodes: 1,
+        depth: 1,
+    };
     let push = |words: &mut Vec<u32>, node: &Bvh2Node| {
         let (min, max) = (node.aabb().min * scale, node.aabb().max * scale);
         words.extend([min.x, min.y, min.z, 0.0, max.x, max.y, max.z].map(f32::to_bits));
@@ -228,7 +236,10 @@ mod tests {
         let mut stack = vec![(0usize, Vec::new())];
         while let Some((node, mut boxes)) = stack.pop() {
             let w = &bvh.words[node * 8..node * 8 + 8];
-            boxes.push((Vec3::new(float(w, 0), float(w, 1), float(w, 2)), Vec3::new(float(w, 4), float(w, 5), float(w, 6))));
+            boxes.push((
+                Vec3::new(float(w, 0), float(w, 1), float(w, 2)),
+                Vec3::new(float(w, 4), float(w, 5), float(w, 6)),
+            ));
             let (first, count) = (w[3] as usize, w[7] as usize);
             if count == 0 {
                 stack.extend([(first, boxes.clone()), (first + 1, boxes)]);
@@ -242,7 +253,10 @@ mod tests {
 
     fn assert_inside(boxes: &[(Vec3, Vec3)], corners: &[Vec3; 3]) {
         for (low, high) in boxes {
-            assert!(corners.iter().all(|c| c.cmpge(*low).all() && c.cmple(*high).all()), "{corners:?} outside {low} {high}");
+            assert!(
+                corners.iter().all(|c| c.cmpge(*low).all() && c.cmple(*high).all()),
+                "{corners:?} outside {low} {high}"
+            );
         }
     }
 
@@ -259,9 +273,14 @@ mod tests {
                 if meta == 0 {
                     continue;
                 }
-                let corner = |x: [u8; 8], y: [u8; 8], z: [u8; 8]| node.p + Vec3::new(f32::from(x[child]), f32::from(y[child]), f32::from(z[child])) * step;
+                let corner = |x: [u8; 8], y: [u8; 8], z: [u8; 8]| {
+                    node.p + Vec3::new(f32::from(x[child]), f32::from(y[child]), f32::from(z[child])) * step
+                };
                 let mut boxes = boxes.clone();
-                boxes.push((corner(node.child_min_x, node.child_min_y, node.child_min_z), corner(node.child_max_x, node.child_max_y, node.child_max_z)));
+                boxes.push((
+                    corner(node.child_min_x, node.child_min_y, node.child_min_z),
+                    corner(node.child_max_x, node.child_max_y, node.child_max_z),
+                ));
                 if node.imask & (1 << child) != 0 {
                     stack.push(((node.child_base_idx + inner) as usize, boxes));
                     inner += 1;

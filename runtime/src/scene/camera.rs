@@ -32,7 +32,12 @@ pub struct Camera {
 ///
 /// # Errors
 /// An unknown name, an orthographic camera, a field of view outside (0, pi), a transform without directions.
-pub fn choose(cameras: &[Placed<gltf::Camera<'_>>], wanted: Option<&str>, size: Option<(u32, u32)>, bounds: (DVec3, f64)) -> Result<Camera> {
+pub fn choose(
+    cameras: &[Placed<gltf::Camera<'_>>],
+    wanted: Option<&str>,
+    size: Option<(u32, u32)>,
+    bounds: (DVec3, f64),
+) -> Result<Camera> {
     check_size(size)?;
     let Some(wanted) = wanted else {
         return match cameras.first() {
@@ -58,12 +63,21 @@ fn check_size(size: Option<(u32, u32)>) -> Result<()> {
 }
 
 fn listing(cameras: &[Placed<gltf::Camera<'_>>]) -> String {
-    let perspective = |camera: &&Placed<gltf::Camera<'_>>| matches!(camera.item.projection(), Projection::Perspective(_));
+    let perspective =
+        |camera: &&Placed<gltf::Camera<'_>>| matches!(camera.item.projection(), Projection::Perspective(_));
     let names: Vec<String> = cameras.iter().filter(perspective).map(|camera| format!("`{}`", camera.name)).collect();
-    if names.is_empty() { "the file has no perspective camera".into() } else { format!("perspective cameras: {}", names.join(", ")) }
+    if names.is_empty() {
+        "the file has no perspective camera".into()
+    } else {
+        format!("perspective cameras: {}", names.join(", "))
+    }
 }
 
-fn from_node(camera: &Placed<gltf::Camera<'_>>, all: &[Placed<gltf::Camera<'_>>], size: Option<(u32, u32)>) -> Result<Camera> {
+fn from_node(
+    camera: &Placed<gltf::Camera<'_>>,
+    all: &[Placed<gltf::Camera<'_>>],
+    size: Option<(u32, u32)>,
+) -> Result<Camera> {
     let at = |error: Error| error.at(format!("camera `{}`", camera.name));
     let Projection::Perspective(perspective) = camera.item.projection() else {
         return Err(at(Error::input("orthographic cameras are not supported").help(listing(all))));

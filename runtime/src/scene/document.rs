@@ -37,7 +37,8 @@ pub struct Document {
 pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Document> {
     let bytes = std::fs::read(path).map_err(|error| Error::input(format!("cannot read the file: {error}")))?;
     let (text, blob) = split(&bytes)?;
-    let mut root = json::Root::from_slice(text).map_err(|error| Error::input(format!("the JSON is not glTF 2.0: {error}")))?;
+    let mut root =
+        json::Root::from_slice(text).map_err(|error| Error::input(format!("the JSON is not glTF 2.0: {error}")))?;
     check_version(&root)?;
     check_extensions(&mut root, warnings)?;
     complete(&mut root);
@@ -71,7 +72,10 @@ fn split_glb(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
     }
     let total = word(8).ok_or_else(truncated)? as usize;
     if total > bytes.len() {
-        return Err(Error::input(format!("truncated GLB: the header promises {total} bytes, the file has {}", bytes.len())));
+        return Err(Error::input(format!(
+            "truncated GLB: the header promises {total} bytes, the file has {}",
+            bytes.len()
+        )));
     }
     let (mut text, mut blob, mut at) = (None, None, 12);
     while at + 8 <= total {
@@ -83,7 +87,7 @@ fn split_glb(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
             b"BIN\0" if blob.is_none() => blob = Some(chunk),
             _ => {}
         }
-        at += 8 + length.next_multiple_of(4);
+        at += 8 + length;
     }
     Ok((text.ok_or_else(|| Error::input("GLB without a JSON chunk"))?, blob))
 }
@@ -103,7 +107,8 @@ fn check_extensions(root: &mut json::Root, warnings: &mut Vec<String>) -> Result
             .at("extensionsRequired")
             .help(format!("supported: {}", SUPPORTED.join(", "))));
     }
-    warnings.extend(root.extensions_used.iter().filter(unsupported).map(|name| format!("extension `{name}` is ignored")));
+    warnings
+        .extend(root.extensions_used.iter().filter(unsupported).map(|name| format!("extension `{name}` is ignored")));
     // The library would refuse names that it does not read itself; ours are checked above.
     root.extensions_required.clear();
     Ok(())
@@ -135,14 +140,17 @@ fn check_unions(root: &json::Root) -> Result<()> {
             Checked::Invalid => false,
         };
         if !present {
-            return Err(Error::input("`type` is unknown, or the object it names is missing").at(format!("camera {index}")));
+            return Err(
+                Error::input("`type` is unknown, or the object it names is missing").at(format!("camera {index}"))
+            );
         }
     }
     for (index, mesh) in root.meshes.iter().enumerate() {
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let position = primitive.attributes.get(&Checked::Valid(json::mesh::Semantic::Positions));
             if position.is_none_or(|accessor| accessor.value() >= root.accessors.len()) {
-                return Err(Error::input("no POSITION, or its accessor does not exist").at(format!("mesh {index}, primitive {number}")));
+                return Err(Error::input("no POSITION, or its accessor does not exist")
+                    .at(format!("mesh {index}, primitive {number}")));
             }
         }
     }
@@ -153,7 +161,9 @@ fn check_unions(root: &json::Root) -> Result<()> {
         let at = || format!("light {index}");
         match light.type_ {
             Checked::Invalid => return Err(Error::input("unknown `type`").at(at()).help("point, spot or directional")),
-            Checked::Valid(Type::Spot) if light.spot.is_none() => return Err(Error::input("`spot` is missing").at(at())),
+            Checked::Valid(Type::Spot) if light.spot.is_none() => {
+                return Err(Error::input("`spot` is missing").at(at()));
+            }
             Checked::Valid(_) => {}
         }
     }
@@ -178,7 +188,9 @@ fn invalid(error: gltf::Error) -> Error {
 fn read_buffer(buffer: &gltf::Buffer<'_>, blob: Option<&[u8]>, base: &Path) -> Result<Vec<u8>> {
     let at = || format!("buffer {}", buffer.index());
     let bytes = match buffer.source() {
-        gltf::buffer::Source::Bin => blob.ok_or_else(|| Error::input("it has no URI and the file has no BIN chunk").at(at()))?.to_vec(),
+        gltf::buffer::Source::Bin => {
+            blob.ok_or_else(|| Error::input("it has no URI and the file has no BIN chunk").at(at()))?.to_vec()
+        }
         gltf::buffer::Source::Uri(uri) => uri::read(uri, base).map_err(|error| error.at(at()))?,
     };
     if bytes.len() < buffer.length() {

@@ -108,8 +108,14 @@ impl<'a> Map<'a> {
 
     fn sampled_mean(&self, corners: &[[f64; 2]; 3], image: &Image) -> f64 {
         let at = |b1: f64, b2: f64| {
-            let coordinate = |axis: usize| corners[0][axis] + b1 * (corners[1][axis] - corners[0][axis]) + b2 * (corners[2][axis] - corners[0][axis]);
-            let texel = |axis: usize, count: u32| self.slot.wrap[axis].texel((coordinate(axis) * f64::from(count)).floor() as i64, count);
+            let coordinate = |axis: usize| {
+                corners[0][axis]
+                    + b1 * (corners[1][axis] - corners[0][axis])
+                    + b2 * (corners[2][axis] - corners[0][axis])
+            };
+            let texel = |axis: usize, count: u32| {
+                self.slot.wrap[axis].texel((coordinate(axis) * f64::from(count)).floor() as i64, count)
+            };
             self.values[texel(1, image.height) * image.width as usize + texel(0, image.width)]
         };
         let n = f64::from(SUBDIVISIONS);
@@ -155,7 +161,14 @@ mod tests {
     }
 
     fn slot(wrap: Wrap) -> Slot {
-        Slot { image: 0, matrix: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], wrap: [wrap; 2], nearest: false, srgb: true, set: 0 }
+        Slot {
+            image: 0,
+            matrix: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            wrap: [wrap; 2],
+            nearest: false,
+            srgb: true,
+            set: 0,
+        }
     }
 
     #[test]

@@ -29,7 +29,12 @@ pub fn effects(evidence: &Evidence<'_>) -> Effects {
         let present = reason.is_ok();
         out.insert(name.to_owned(), Effect { present, reason: reason.unwrap_or_else(str::to_owned) });
     };
-    for (name, reason) in light_effects(evidence).into_iter().chain(texture_effects(evidence)).chain(geometry_effects(evidence)).chain(lobe_effects(evidence)) {
+    for (name, reason) in light_effects(evidence)
+        .into_iter()
+        .chain(texture_effects(evidence))
+        .chain(geometry_effects(evidence))
+        .chain(lobe_effects(evidence))
+    {
         add(name, reason);
     }
     out
@@ -53,15 +58,25 @@ fn light_effects(evidence: &Evidence<'_>) -> Vec<Finding> {
         _ => false,
     };
     let two_sided = evidence.lights.list.iter().find(both_sides).and_then(|light| match light.shape {
-        Shape::Triangle { triangle, .. } => Some(format!("{} emits and is double-sided", material_of(evidence, triangle).name)),
+        Shape::Triangle { triangle, .. } => {
+            Some(format!("{} emits and is double-sided", material_of(evidence, triangle).name))
+        }
         _ => None,
     });
     vec![
         ("area_light", count(is_area, "emissive triangle").ok_or("no triangle emits")),
         ("point_light", count(|l| matches!(l.shape, Shape::Point { .. }), "point light").ok_or("no point light")),
         ("spot_light", count(|l| matches!(l.shape, Shape::Spot { .. }), "spot light").ok_or("no spot light")),
-        ("directional_light", count(|l| matches!(l.shape, Shape::Directional { .. }), "directional light").ok_or("no directional light")),
-        ("sky", count(|l| matches!(l.shape, Shape::Sky), "environment map").map(|_| "an environment map is given".into()).ok_or("no environment map")),
+        (
+            "directional_light",
+            count(|l| matches!(l.shape, Shape::Directional { .. }), "directional light").ok_or("no directional light"),
+        ),
+        (
+            "sky",
+            count(|l| matches!(l.shape, Shape::Sky), "environment map")
+                .map(|_| "an environment map is given".into())
+                .ok_or("no environment map"),
+        ),
         ("two_sided_emission", two_sided.ok_or("no double-sided material emits")),
     ]
 }
@@ -81,12 +96,25 @@ fn texture_effects(evidence: &Evidence<'_>) -> Vec<Finding> {
     let second = |m: &Material| m.slots.iter().flatten().any(|slot| slot.set == 1);
     vec![
         ("texture_base_color", role(Role::BaseColor, "has a base colour texture").ok_or("no base colour texture")),
-        ("texture_metallic_roughness", role(Role::MetallicRoughness, "has a metallic-roughness texture").ok_or("no metallic-roughness texture")),
+        (
+            "texture_metallic_roughness",
+            role(Role::MetallicRoughness, "has a metallic-roughness texture").ok_or("no metallic-roughness texture"),
+        ),
         ("texture_emissive", role(Role::Emissive, "has an emissive texture").ok_or("no emissive texture")),
-        ("texture_transmission", role(Role::Transmission, "has a transmission texture").ok_or("no transmission texture")),
+        (
+            "texture_transmission",
+            role(Role::Transmission, "has a transmission texture").ok_or("no transmission texture"),
+        ),
         ("texture_specular", first(evidence, specular, "has a specular texture").ok_or("no specular texture")),
-        ("textures", first(evidence, |m| m.slots.iter().any(Option::is_some), "is textured").ok_or("no material is textured")),
-        ("second_uv", first(evidence, second, "uses two sets of texture coordinates").ok_or("no material uses two sets of texture coordinates")),
+        (
+            "textures",
+            first(evidence, |m| m.slots.iter().any(Option::is_some), "is textured").ok_or("no material is textured"),
+        ),
+        (
+            "second_uv",
+            first(evidence, second, "uses two sets of texture coordinates")
+                .ok_or("no material uses two sets of texture coordinates"),
+        ),
         ("normal_map", role(Role::Normal, "has a normal map").ok_or("no normal map")),
     ]
 }
@@ -100,7 +128,10 @@ fn geometry_effects(evidence: &Evidence<'_>) -> Vec<Finding> {
     let alpha = of_material(|t| t.alpha_tested, "has holes or is partly transparent");
     let lens = (evidence.lens_radius > 0.0).then(|| format!("lens radius {} m", evidence.lens_radius));
     vec![
-        ("vertex_colors", evidence.vertex_colors.then(|| "a mesh has vertex colours".into()).ok_or("no mesh has vertex colours")),
+        (
+            "vertex_colors",
+            evidence.vertex_colors.then(|| "a mesh has vertex colours".into()).ok_or("no mesh has vertex colours"),
+        ),
         ("shading_normals", curved.ok_or("all vertex normals are face normals")),
         ("alpha", alpha.ok_or("every surface is opaque")),
         ("lens", lens.ok_or("the camera is a pinhole")),
@@ -134,20 +165,45 @@ fn lobes(material: &Material, images: &[Image]) -> Lobes {
 }
 
 fn lobe_effects(evidence: &Evidence<'_>) -> Vec<Finding> {
-    let with = |test: &dyn Fn(&Material, Lobes) -> bool, verb: &str| first(evidence, |m| test(m, lobes(m, evidence.images)), verb);
+    let with = |test: &dyn Fn(&Material, Lobes) -> bool, verb: &str| {
+        first(evidence, |m| test(m, lobes(m, evidence.images)), verb)
+    };
     let absorbs = |m: &Material| m.absorption.iter().any(|&sigma| sigma > 0.0);
     vec![
         ("diffuse", with(&|_, l| l.diffuse, "has a diffuse lobe").ok_or("no material has a diffuse lobe")),
         ("specular", with(&|_, l| l.reflects, "reflects specularly").ok_or("every material is exactly Lambert")),
         ("metal", with(&|_, l| l.metal, "is metallic").ok_or("no material is metallic")),
-        ("rough_specular", with(&|_, l| l.reflects && l.rough, "has a rough reflection").ok_or("no material has a rough reflection")),
-        ("delta_specular", with(&|_, l| l.reflects && l.smooth, "is perfectly smooth").ok_or("no material with a reflection is perfectly smooth")),
+        (
+            "rough_specular",
+            with(&|_, l| l.reflects && l.rough, "has a rough reflection").ok_or("no material has a rough reflection"),
+        ),
+        (
+            "delta_specular",
+            with(&|_, l| l.reflects && l.smooth, "is perfectly smooth")
+                .ok_or("no material with a reflection is perfectly smooth"),
+        ),
         ("transmission", with(&|_, l| l.transmits, "transmits").ok_or("no material transmits")),
-        ("solid_glass", with(&|m, l| l.transmits && m.solid, "bounds a solid that transmits").ok_or("no solid transmits")),
-        ("thin_glass", with(&|m, l| l.transmits && !m.solid, "is a thin sheet that transmits").ok_or("no thin sheet transmits")),
-        ("rough_transmission", with(&|_, l| l.transmits && l.rough, "transmits roughly").ok_or("no material transmits roughly")),
-        ("delta_transmission", with(&|_, l| l.transmits && l.smooth, "transmits and is perfectly smooth").ok_or("no material that transmits is perfectly smooth")),
+        (
+            "solid_glass",
+            with(&|m, l| l.transmits && m.solid, "bounds a solid that transmits").ok_or("no solid transmits"),
+        ),
+        (
+            "thin_glass",
+            with(&|m, l| l.transmits && !m.solid, "is a thin sheet that transmits").ok_or("no thin sheet transmits"),
+        ),
+        (
+            "rough_transmission",
+            with(&|_, l| l.transmits && l.rough, "transmits roughly").ok_or("no material transmits roughly"),
+        ),
+        (
+            "delta_transmission",
+            with(&|_, l| l.transmits && l.smooth, "transmits and is perfectly smooth")
+                .ok_or("no material that transmits is perfectly smooth"),
+        ),
         ("attenuation", with(&|m, l| l.transmits && m.solid && absorbs(m), "absorbs inside").ok_or("no solid absorbs")),
-        ("delta", with(&|_, l| l.smooth && (l.reflects || l.transmits), "is perfectly smooth").ok_or("no lobe is a delta")),
+        (
+            "delta",
+            with(&|_, l| l.smooth && (l.reflects || l.transmits), "is perfectly smooth").ok_or("no lobe is a delta"),
+        ),
     ]
 }

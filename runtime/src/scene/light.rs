@@ -80,13 +80,20 @@ pub fn collect(
     radius: f64,
     warnings: &mut Vec<String>,
 ) -> Result<Lights> {
-    let mut list: Vec<Light> = triangles.iter().enumerate().filter_map(|(index, triangle)| area_light(index, triangle, emission)).collect();
+    let mut list: Vec<Light> =
+        triangles.iter().enumerate().filter_map(|(index, triangle)| area_light(index, triangle, emission)).collect();
     for light in punctual {
-        let placed = punctual_light(light, moved_by, radius, warnings).map_err(|error| error.at(format!("light `{}`", light.name)))?;
+        let placed = punctual_light(light, moved_by, radius, warnings)
+            .map_err(|error| error.at(format!("light `{}`", light.name)))?;
         list.extend(placed);
     }
     let disc = PI * radius * radius;
-    list.extend(sky.map(|sky| Light { shape: Shape::Sky, intensity: [0.0; 3], power: sky.integral * disc, name: "sky".into() }));
+    list.extend(sky.map(|sky| Light {
+        shape: Shape::Sky,
+        intensity: [0.0; 3],
+        power: sky.integral * disc,
+        name: "sky".into(),
+    }));
     list.retain(|light| light.power > 0.0);
     let probabilities = alias::probabilities(&list.iter().map(|light| light.power).collect::<Vec<_>>());
     Ok(Lights { list, probabilities })
@@ -98,7 +105,12 @@ fn area_light(index: usize, triangle: &Triangle, emission: &Emission<'_>) -> Opt
     (power > 0.0).then(|| Light { shape, intensity: [0.0; 3], power, name: String::new() })
 }
 
-fn punctual_light(light: &Placed<PunctualLight<'_>>, moved_by: DVec3, radius: f64, warnings: &mut Vec<String>) -> Result<Option<Light>> {
+fn punctual_light(
+    light: &Placed<PunctualLight<'_>>,
+    moved_by: DVec3,
+    radius: f64,
+    warnings: &mut Vec<String>,
+) -> Result<Option<Light>> {
     let intensity = light.item.color().map(|c| c * light.item.intensity());
     if !intensity.iter().all(|c| c.is_finite() && *c >= 0.0) {
         return Err(Error::input(format!("color x intensity is {intensity:?}")).help("finite and not negative"));
@@ -106,7 +118,8 @@ fn punctual_light(light: &Placed<PunctualLight<'_>>, moved_by: DVec3, radius: f6
     let position = light.matrix.w_axis.truncate() - moved_by;
     let direction = (-light.matrix.z_axis.truncate()).try_normalize();
     if direction.is_none() && !matches!(light.item.kind(), Kind::Point) {
-        warnings.push(format!("light `{}` has no direction (its node is scaled to nothing) and is left out", light.name));
+        warnings
+            .push(format!("light `{}` has no direction (its node is scaled to nothing) and is left out", light.name));
         return Ok(None);
     }
     let direction = direction.unwrap_or(DVec3::NEG_Z);
@@ -128,7 +141,8 @@ fn punctual_light(light: &Placed<PunctualLight<'_>>, moved_by: DVec3, radius: f6
 fn cone(inner: f32, outer: f32) -> Result<(f64, f64)> {
     const LEAST_RIM: f64 = 1e-5;
     let (inner, outer) = (f64::from(inner), f64::from(outer));
-    if !(0.0..=outer).contains(&inner) || !(outer > 0.0 && outer <= PI / 2.0 + 1e-6) {
+    let ordered = (0.0..=outer).contains(&inner) && outer > 0.0 && outer <= PI / 2.0 + 1e-6;
+    if !ordered {
         let message = format!("innerConeAngle is {inner}, outerConeAngle {outer}");
         return Err(Error::input(message).help("0 <= inner <= outer <= pi/2, outer > 0"));
     }

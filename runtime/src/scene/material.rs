@@ -119,7 +119,10 @@ fn factors(material: &gltf::Material<'_>, name: String) -> Result<Material> {
         transmission: unit("transmissionFactor", transmission)?,
         emission: non_negative("emissiveFactor x emissiveStrength", material.emissive_factor().map(|c| c * strength))?,
         specular: unit("specularFactor", specular.as_ref().map_or(1.0, |s| s.specular_factor()))?,
-        specular_color: non_negative("specularColorFactor", specular.as_ref().map_or([1.0; 3], |s| s.specular_color_factor()))?,
+        specular_color: non_negative(
+            "specularColorFactor",
+            specular.as_ref().map_or([1.0; 3], |s| s.specular_color_factor()),
+        )?,
         absorption: [0.0; 3],
         alpha_cutoff: material.alpha_cutoff().unwrap_or(0.5),
         normal_scale: material.normal_texture().map_or(1.0, |texture| texture.scale()),
@@ -137,14 +140,26 @@ fn factors(material: &gltf::Material<'_>, name: String) -> Result<Material> {
         return Err(Error::input("alphaCutoff or the scale of the normal map is not finite"));
     }
     if unlit {
-        let lambert = Material { metallic: 0.0, roughness: 1.0, transmission: 0.0, specular: 0.0, emission: [0.0; 3], solid: false, ..out };
+        let lambert = Material {
+            metallic: 0.0,
+            roughness: 1.0,
+            transmission: 0.0,
+            specular: 0.0,
+            emission: [0.0; 3],
+            solid: false,
+            ..out
+        };
         return Ok(Material { absorption: [0.0; 3], ..lambert });
     }
     Ok(out)
 }
 
 fn unit(name: &str, value: f32) -> Result<f32> {
-    if value.is_finite() { Ok(value.clamp(0.0, 1.0)) } else { Err(Error::input(format!("{name} is {value}")).help("0 to 1")) }
+    if value.is_finite() {
+        Ok(value.clamp(0.0, 1.0))
+    } else {
+        Err(Error::input(format!("{name} is {value}")).help("0 to 1"))
+    }
 }
 
 fn non_negative(name: &str, value: [f32; 3]) -> Result<[f32; 3]> {
@@ -172,14 +187,16 @@ fn absorption(color: [f32; 3], distance: f32) -> Result<[f32; 3]> {
     if distance >= f32::MAX {
         return Ok([0.0; 3]);
     }
-    Ok(color.map(|c| (-f64::from(c).clamp(DARKEST, 1.0).ln() / f64::from(distance)).min(f64::from(f32::MAX)) as f32 + 0.0))
+    Ok(color
+        .map(|c| (-f64::from(c).clamp(DARKEST, 1.0).ln() / f64::from(distance)).min(f64::from(f32::MAX)) as f32 + 0.0))
 }
 
 /// The textures that matter, by role. Those behind a factor of 0 do not.
 fn references<'a>(material: &gltf::Material<'a>, unlit: bool) -> Vec<(Role, Reference<'a>)> {
     let pbr = material.pbr_metallic_roughness();
     let mut out = Vec::new();
-    let mut add = |role: Role, info: Option<gltf::texture::Info<'a>>| out.extend(info.map(|info| (role, Reference::new(&info))));
+    let mut add =
+        |role: Role, info: Option<gltf::texture::Info<'a>>| out.extend(info.map(|info| (role, Reference::new(&info))));
     add(Role::BaseColor, pbr.base_color_texture());
     if unlit {
         return out;
@@ -207,7 +224,8 @@ fn uv_sets(references: &[(Role, Reference<'_>)]) -> Result<Vec<u32>> {
     sets.sort_unstable();
     sets.dedup();
     if sets.len() > 2 {
-        return Err(Error::input(format!("its textures use the texture coordinate sets {sets:?}")).help("at most two sets in one material"));
+        return Err(Error::input(format!("its textures use the texture coordinate sets {sets:?}"))
+            .help("at most two sets in one material"));
     }
     Ok(sets)
 }

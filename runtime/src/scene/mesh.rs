@@ -32,7 +32,12 @@ pub struct Primitive {
 ///
 /// # Errors
 /// Accessors that do not fit, indices that name no vertex, positions that are not finite.
-pub fn read(document: &Document, primitive: &gltf::Primitive<'_>, material: (usize, &Material), warnings: &mut Vec<String>) -> Result<Option<Primitive>> {
+pub fn read(
+    document: &Document,
+    primitive: &gltf::Primitive<'_>,
+    material: (usize, &Material),
+    warnings: &mut Vec<String>,
+) -> Result<Option<Primitive>> {
     let position = primitive.get(&Semantic::Positions).ok_or_else(|| Error::input("no POSITION"))?;
     if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         warnings.push("points and lines are ignored".into());
@@ -41,7 +46,8 @@ pub fn read(document: &Document, primitive: &gltf::Primitive<'_>, material: (usi
     if primitive.morph_targets().next().is_some() {
         warnings.push("morph targets are ignored".into());
     }
-    let positions = accessor::floats::<3>(document, &position, Dimensions::Vec3).map_err(|error| error.at("POSITION"))?;
+    let positions =
+        accessor::floats::<3>(document, &position, Dimensions::Vec3).map_err(|error| error.at("POSITION"))?;
     check_finite(&positions, &position)?;
     let corners = match primitive.indices() {
         Some(indices) => accessor::indices(document, &indices).map_err(|error| error.at("indices"))?,
@@ -108,10 +114,17 @@ struct Attributes<'a> {
 
 impl Attributes<'_> {
     /// One attribute, with elements that are not finite replaced.
-    fn floats<const N: usize>(&self, semantic: Semantic, dimensions: Dimensions, neutral: [f32; N], warnings: &mut Vec<String>) -> Result<Option<Vec<[f32; N]>>> {
+    fn floats<const N: usize>(
+        &self,
+        semantic: Semantic,
+        dimensions: Dimensions,
+        neutral: [f32; N],
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Vec<[f32; N]>>> {
         let Some(accessor) = self.primitive.get(&semantic) else { return Ok(None) };
         let name = semantic.to_string();
-        let mut values = accessor::floats::<N>(self.document, &accessor, dimensions).map_err(|error| error.at(&name))?;
+        let mut values =
+            accessor::floats::<N>(self.document, &accessor, dimensions).map_err(|error| error.at(&name))?;
         if values.len() != self.count {
             let message = format!("{} elements, POSITION has {}", values.len(), self.count);
             return Err(Error::input(message).at(format!("{name}, accessor {}", accessor.index())));
@@ -122,7 +135,10 @@ impl Attributes<'_> {
             replaced += 1;
         }
         if replaced > 0 {
-            warnings.push(format!("{replaced} elements of {name} (accessor {}) are not finite and count as {neutral:?}", accessor.index()));
+            warnings.push(format!(
+                "{replaced} elements of {name} (accessor {}) are not finite and count as {neutral:?}",
+                accessor.index()
+            ));
         }
         Ok(Some(values))
     }

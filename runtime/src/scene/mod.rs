@@ -19,6 +19,8 @@ mod sky;
 mod source;
 mod stats;
 mod tangent;
+#[cfg(test)]
+mod tests;
 mod texture;
 mod triangle;
 mod uri;
@@ -132,10 +134,23 @@ fn read(source: &source::Source, options: &LoadOptions) -> Result<Scene> {
         Some(sky) => sky::read(&sky.file, sky.scale, sky.rotate_deg, &mut warnings)?,
         None => None,
     };
-    let camera = camera::choose(&placements.cameras, options.camera.as_deref(), options.size, (bounds.0 + geometry.moved_by, bounds.1))?;
+    let camera = camera::choose(
+        &placements.cameras,
+        options.camera.as_deref(),
+        options.size,
+        (bounds.0 + geometry.moved_by, bounds.1),
+    )?;
     let lens = lens(&camera, options, bounds.0 + geometry.moved_by)?;
     let emission = Emission::new(&materials, &images);
-    let lights = light::collect(&triangles, &emission, &placements.lights, geometry.moved_by, sky.as_ref(), bounds.1, &mut warnings)?;
+    let lights = light::collect(
+        &triangles,
+        &emission,
+        &placements.lights,
+        geometry.moved_by,
+        sky.as_ref(),
+        bounds.1,
+        &mut warnings,
+    )?;
     if lights.list.is_empty() {
         warnings.push("the scene has no light: pictures of it are black".into());
     }
@@ -221,7 +236,8 @@ fn bounding_sphere(triangles: &[Triangle]) -> (DVec3, f64) {
     /// Keeps corners inside after the radius is rounded to f32.
     const MARGIN: f64 = 1.0 + 1e-5;
     let corners = || triangles.iter().flat_map(|triangle| triangle.positions).map(|corner| corner.as_dvec3());
-    let (low, high) = corners().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| (low.min(corner), high.max(corner)));
+    let (low, high) = corners()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| (low.min(corner), high.max(corner)));
     if triangles.is_empty() {
         return (DVec3::ZERO, 1.0);
     }

@@ -46,7 +46,8 @@ pub fn place<'a>(document: &'a Document, warnings: &mut Vec<String>) -> Result<P
     let mut placements = Placements::default();
     let nodes: Vec<gltf::Node<'a>> = document.gltf.nodes().collect();
     let mut on_path = vec![false; nodes.len()];
-    let mut stack: Vec<Step> = roots(document).into_iter().rev().map(|node| Step::Enter(node, DMat4::IDENTITY)).collect();
+    let mut stack: Vec<Step> =
+        roots(document).into_iter().rev().map(|node| Step::Enter(node, DMat4::IDENTITY)).collect();
     while let Some(step) = stack.pop() {
         match step {
             Step::Leave(index) => on_path[index] = false,
@@ -55,7 +56,8 @@ pub fn place<'a>(document: &'a Document, warnings: &mut Vec<String>) -> Result<P
                     return Err(Error::input("the node is its own descendant").at(format!("node {index}")));
                 }
                 let node = &nodes[index];
-                let matrix = visit(document, node, parent, &mut placements, warnings).map_err(|error| error.at(describe(node)))?;
+                let matrix = visit(document, node, parent, &mut placements, warnings)
+                    .map_err(|error| error.at(describe(node)))?;
                 stack.push(Step::Leave(index));
                 let children: Vec<usize> = node.children().map(|child| child.index()).collect();
                 stack.extend(children.into_iter().rev().map(|child| Step::Enter(child, matrix)));
@@ -84,7 +86,13 @@ fn describe(node: &gltf::Node<'_>) -> String {
     node.name().map_or_else(|| format!("node {}", node.index()), |name| format!("node {} `{name}`", node.index()))
 }
 
-fn visit<'a>(document: &Document, node: &gltf::Node<'a>, parent: DMat4, out: &mut Placements<'a>, warnings: &mut Vec<String>) -> Result<DMat4> {
+fn visit<'a>(
+    document: &Document,
+    node: &gltf::Node<'a>,
+    parent: DMat4,
+    out: &mut Placements<'a>,
+    warnings: &mut Vec<String>,
+) -> Result<DMat4> {
     let matrix = parent * local(node)?;
     let name = node.name().map_or_else(|| format!("node {}", node.index()), str::to_owned);
     if let Some(mesh) = node.mesh() {
@@ -121,7 +129,11 @@ fn local(node: &gltf::Node<'_>) -> Result<DMat4> {
 fn compose(translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3]) -> DMat4 {
     let rotation = DQuat::from_array(rotation.map(f64::from));
     let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
-    DMat4::from_scale_rotation_translation(DVec3::from(scale.map(f64::from)), rotation, DVec3::from(translation.map(f64::from)))
+    DMat4::from_scale_rotation_translation(
+        DVec3::from(scale.map(f64::from)),
+        rotation,
+        DVec3::from(translation.map(f64::from)),
+    )
 }
 
 /// Transforms of EXT_mesh_gpu_instancing, or the identity.
@@ -129,14 +141,20 @@ fn copies(document: &Document, node: &gltf::Node<'_>) -> Result<Vec<DMat4>> {
     const NAME: &str = "EXT_mesh_gpu_instancing";
     let Some(extension) = node.extension_value(NAME) else { return Ok(vec![DMat4::IDENTITY]) };
     let find = |key: &str| -> Result<Option<gltf::Accessor<'_>>> {
-        let Some(value) = extension.get("attributes").and_then(|attributes| attributes.get(key)) else { return Ok(None) };
+        let Some(value) = extension.get("attributes").and_then(|attributes| attributes.get(key)) else {
+            return Ok(None);
+        };
         let accessor = value.as_u64().and_then(|index| document.gltf.accessors().nth(usize::try_from(index).ok()?));
-        accessor.map(Some).ok_or_else(|| Error::input(format!("accessor {value} does not exist")).at(format!("{NAME}, {key}")))
+        accessor
+            .map(Some)
+            .ok_or_else(|| Error::input(format!("accessor {value} does not exist")).at(format!("{NAME}, {key}")))
     };
-    let translations = find("TRANSLATION")?.map(|a| accessor::floats::<3>(document, &a, Dimensions::Vec3)).transpose()?;
+    let translations =
+        find("TRANSLATION")?.map(|a| accessor::floats::<3>(document, &a, Dimensions::Vec3)).transpose()?;
     let rotations = find("ROTATION")?.map(|a| accessor::floats::<4>(document, &a, Dimensions::Vec4)).transpose()?;
     let scales = find("SCALE")?.map(|a| accessor::floats::<3>(document, &a, Dimensions::Vec3)).transpose()?;
-    let lengths = [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
+    let lengths =
+        [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
     let mut given = lengths.into_iter().flatten();
     let count = given.next().unwrap_or(1);
     if let Some(other) = given.find(|&other| other != count) {

@@ -1,11 +1,11 @@
 //! The scene as the kernels read it: little-endian 32-bit words, as `stages/wgsl/scene` declares them.
 
-use super::{Accelerator, Scene};
 use super::alias;
 use super::light::{Light, Shape};
 use super::material::Material;
 use super::texture::{Slot, Wrap};
 use super::triangle::Triangle;
+use super::{Accelerator, Scene};
 use bytemuck::NoUninit;
 use gltf::material::AlphaMode;
 use std::sync::OnceLock;
@@ -129,7 +129,10 @@ fn material_flags(material: &Material) -> u32 {
     /// Vertex colours multiply the base colour of every material.
     const VERTEX_COLORS: u32 = 1 << 4;
     const FIRST_TEXTURE: usize = 8;
-    let mut flags = VERTEX_COLORS | u32::from(material.double_sided) | u32::from(material.solid) << 1 | u32::from(material.unlit) << 5;
+    let mut flags = VERTEX_COLORS
+        | u32::from(material.double_sided)
+        | u32::from(material.solid) << 1
+        | u32::from(material.unlit) << 5;
     flags |= match material.alpha_mode {
         AlphaMode::Opaque => 0,
         AlphaMode::Mask => 1 << 2,
@@ -140,12 +143,17 @@ fn material_flags(material: &Material) -> u32 {
 }
 
 fn texture_slots(scene: &Scene) -> Vec<[u32; 12]> {
-    let offsets: Vec<u32> = scene.images.iter().scan(0u32, |next, image| {
-        let offset = *next;
-        *next += image.texels.len() as u32;
-        Some(offset)
-    }).collect();
-    let pack = |slot: &Option<Slot>| slot.as_ref().map_or([0; 12], |slot| texture_slot(scene, slot, offsets[slot.image]));
+    let offsets: Vec<u32> = scene
+        .images
+        .iter()
+        .scan(0u32, |next, image| {
+            let offset = *next;
+            *next += image.texels.len() as u32;
+            Some(offset)
+        })
+        .collect();
+    let pack =
+        |slot: &Option<Slot>| slot.as_ref().map_or([0; 12], |slot| texture_slot(scene, slot, offsets[slot.image]));
     scene.materials.iter().flat_map(|material| material.slots.iter().map(pack)).collect()
 }
 
@@ -156,7 +164,11 @@ fn texture_slot(scene: &Scene, slot: &Slot, offset: u32) -> [u32; 12] {
         Wrap::Clamp => 1,
         Wrap::Mirror => 2,
     };
-    let flags = wrap(slot.wrap[0]) | wrap(slot.wrap[1]) << 2 | u32::from(slot.nearest) << 4 | u32::from(slot.srgb) << 5 | (slot.set as u32) << 6;
+    let flags = wrap(slot.wrap[0])
+        | wrap(slot.wrap[1]) << 2
+        | u32::from(slot.nearest) << 4
+        | u32::from(slot.srgb) << 5
+        | (slot.set as u32) << 6;
     let [[m00, m01, m02], [m10, m11, m12]] = slot.matrix.map(|row| row.map(f32::to_bits));
     [offset, image.width | image.height << 16, flags, 0, m00, m01, m02, 0, m10, m11, m12, 0]
 }
@@ -165,7 +177,13 @@ fn lights(scene: &Scene) -> Vec<[[f32; 4]; 4]> {
     let order = &scene.bvh().order;
     let mut place = vec![0u32; order.len()];
     order.iter().zip(0..).for_each(|(&index, prim)| place[index as usize] = prim);
-    scene.lights.list.iter().zip(&scene.lights.probabilities).map(|(entry, &probability)| light(entry, probability, &place)).collect()
+    scene
+        .lights
+        .list
+        .iter()
+        .zip(&scene.lights.probabilities)
+        .map(|(entry, &probability)| light(entry, probability, &place))
+        .collect()
 }
 
 /// `place` leads from a triangle in document order to the leaf order.

@@ -28,7 +28,9 @@ pub struct Sky {
 /// A file that cannot be read or has no colour channels, a scale or rotation that is not finite.
 pub fn read(path: &Path, scale: f64, rotate_deg: f64, warnings: &mut Vec<String>) -> Result<Option<Sky>> {
     if !(scale.is_finite() && scale >= 0.0 && rotate_deg.is_finite()) {
-        return Err(Error::input(format!("scale {scale}, rotation {rotate_deg} degrees")).in_file(path).help("a finite scale of 0 or more"));
+        return Err(Error::input(format!("scale {scale}, rotation {rotate_deg} degrees"))
+            .in_file(path)
+            .help("a finite scale of 0 or more"));
     }
     let (size, mut radiance) = pixels(path).map_err(|error| error.in_file(path))?;
     repair(&mut radiance, scale, path, warnings);
@@ -46,11 +48,16 @@ fn pixels(path: &Path) -> Result<Pixels> {
     let (size, radiance) = if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         exr_pixels(&bytes)?
     } else if bytes.starts_with(b"#?") {
-        let image = image::load_from_memory_with_format(&bytes, image::ImageFormat::Hdr);
-        let image = image.map_err(|error| Error::input(format!("not a Radiance HDR file: {error}")))?.into_rgb32f();
+        // Not strict: the program that writes a file signs it `#?RGBE` as often as `#?RADIANCE`.
+        let decoder = image::codecs::hdr::HdrDecoder::new_nonstrict(bytes.as_slice());
+        let image = decoder.and_then(image::DynamicImage::from_decoder);
+        let image =
+            image.map_err(|error| Error::input(format!("cannot read the Radiance HDR file: {error}")))?.into_rgb32f();
         (image.dimensions(), image.pixels().map(|pixel| pixel.0).collect())
     } else {
-        return Err(Error::input("the sky is neither OpenEXR nor Radiance HDR").help("an .exr or .hdr file, equirectangular"));
+        return Err(
+            Error::input("the sky is neither OpenEXR nor Radiance HDR").help("an .exr or .hdr file, equirectangular")
+        );
     };
     if size.0 == 0 || size.1 == 0 {
         return Err(Error::input(format!("the sky is {}x{}", size.0, size.1)).help("at least 1x1"));
@@ -72,7 +79,10 @@ fn exr_pixels(bytes: &[u8]) -> Result<Pixels> {
     let names: Vec<String> = layer.channel_data.list.iter().map(|channel| channel.name.to_string()).collect();
     let find = |wanted: &str| {
         let matches = |name: &String| name.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case(wanted));
-        names.iter().position(matches).map(|index| layer.channel_data.list[index].sample_data.values_as_f32().collect::<Vec<f32>>())
+        names
+            .iter()
+            .position(matches)
+            .map(|index| layer.channel_data.list[index].sample_data.values_as_f32().collect::<Vec<f32>>())
     };
     let channels = match (find("R"), find("G"), find("B")) {
         (Some(r), Some(g), Some(b)) => [r, g, b],
@@ -97,10 +107,17 @@ fn repair(radiance: &mut [[f32; 3]], scale: f64, path: &Path, warnings: &mut Vec
     for value in radiance.as_flattened_mut() {
         let valid = value.is_finite() && *value >= 0.0;
         replaced += usize::from(!valid);
-        *value = if valid { scaled(*value) } else if *value == f32::INFINITY { scaled(largest) } else { 0.0 };
+        *value = if valid {
+            scaled(*value)
+        } else if *value == f32::INFINITY {
+            scaled(largest)
+        } else {
+            0.0
+        };
     }
     if replaced > 0 {
-        warnings.push(format!("sky {}: {replaced} values are negative or not finite and were replaced", path.display()));
+        warnings
+            .push(format!("sky {}: {replaced} values are negative or not finite and were replaced", path.display()));
     }
 }
 
@@ -116,7 +133,14 @@ fn build((width, height): (u32, u32), radiance: Vec<[f32; 3]>, rotation: f64) ->
         return None;
     }
     let texel_area = 2.0 * PI * PI / (f64::from(width) * f64::from(height));
-    Some(Sky { width, height, probabilities: alias::probabilities(&weights), radiance, rotation, integral: total * texel_area })
+    Some(Sky {
+        width,
+        height,
+        probabilities: alias::probabilities(&weights),
+        radiance,
+        rotation,
+        integral: total * texel_area,
+    })
 }
 
 /// Mean over each texel of the bilinearly interpolated luminance, times the mean of sin(theta) over it.

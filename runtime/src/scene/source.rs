@@ -52,7 +52,9 @@ pub fn resolve(path: &Path, options: &LoadOptions) -> Result<Source> {
         return from_folder(path, options);
     }
     if !path.exists() {
-        return Err(Error::input("no such file").in_file(path).help("a .glb or .gltf file, or a folder with a scene.toml"));
+        return Err(Error::input("no such file")
+            .in_file(path)
+            .help("a .glb or .gltf file, or a folder with a scene.toml"));
     }
     let beside = path.with_file_name(DESCRIPTION);
     let description = if beside.is_file() { describe(&beside)? } else { Description::default() };
@@ -64,7 +66,9 @@ pub fn resolve(path: &Path, options: &LoadOptions) -> Result<Source> {
 fn from_folder(folder: &Path, options: &LoadOptions) -> Result<Source> {
     let path = folder.join(DESCRIPTION);
     if !path.is_file() {
-        return Err(Error::input(format!("the folder has no {DESCRIPTION}")).in_file(folder).help("a .glb or .gltf file, or a folder with a scene.toml"));
+        return Err(Error::input(format!("the folder has no {DESCRIPTION}"))
+            .in_file(folder)
+            .help("a .glb or .gltf file, or a folder with a scene.toml"));
     }
     let description = describe(&path)?;
     if description.file.is_empty() {
@@ -78,7 +82,8 @@ fn from_folder(folder: &Path, options: &LoadOptions) -> Result<Source> {
 }
 
 fn describe(path: &Path) -> Result<Description> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::input(format!("cannot read it: {error}")).in_file(path))?;
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| Error::input(format!("cannot read it: {error}")).in_file(path))?;
     toml::from_str(&text).map_err(|error| {
         let help = "env = { file = \"sky.exr\", scale = 1.0, rotate_y_deg = 0.0 }";
         Error::input(error.to_string().trim_end().to_owned()).in_file(path).help(help)

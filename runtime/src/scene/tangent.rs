@@ -12,7 +12,11 @@ type Key = ([u32; 3], [u32; 3], [u32; 2], bool);
 /// Tangent (unit) and bitangent sign of every corner; any direction in the surface where the texture coordinates have no gradient.
 pub fn compute(primitive: &Primitive, uv_set: usize) -> Vec<[[f32; 4]; 3]> {
     let Some(uvs) = &primitive.uvs[uv_set] else {
-        return primitive.triangles.iter().map(|&corners| corners.map(|i| fallback(normal(primitive, corners, i)))).collect();
+        return primitive
+            .triangles
+            .iter()
+            .map(|&corners| corners.map(|i| fallback(normal(primitive, corners, i))))
+            .collect();
     };
     let mut sums: HashMap<Key, DVec3> = HashMap::new();
     for &corners in &primitive.triangles {
@@ -20,7 +24,8 @@ pub fn compute(primitive: &Primitive, uv_set: usize) -> Vec<[[f32; 4]; 3]> {
         for (place, &vertex) in corners.iter().enumerate() {
             let normal = normal(primitive, corners, vertex);
             let projected = (gradient - normal * normal.dot(gradient)).normalize_or_zero();
-            *sums.entry(key(primitive, uvs, corners, vertex, mirrored)).or_default() += projected * angle(primitive, corners, place);
+            *sums.entry(key(primitive, uvs, corners, vertex, mirrored)).or_default() +=
+                projected * angle(primitive, corners, place);
         }
     }
     let corner = |corners: [u32; 3], vertex: u32| {

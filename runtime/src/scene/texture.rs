@@ -72,10 +72,14 @@ impl<'a> Reference<'a> {
         let Some(json) = info.extension_value("KHR_texture_transform") else {
             return Self { texture: info.texture(), tex_coord: info.tex_coord(), matrix: IDENTITY };
         };
-        let number = |value: Option<&serde_json::Value>, default: f32| value.and_then(serde_json::Value::as_f64).map_or(default, |v| v as f32);
-        let pair = |key: &str, default: f32| [0, 1].map(|i| number(json.get(key).and_then(|value| value.get(i)), default));
+        let number = |value: Option<&serde_json::Value>, default: f32| {
+            value.and_then(serde_json::Value::as_f64).map_or(default, |v| v as f32)
+        };
+        let pair =
+            |key: &str, default: f32| [0, 1].map(|i| number(json.get(key).and_then(|value| value.get(i)), default));
         let matrix = transform_matrix(pair("offset", 0.0), number(json.get("rotation"), 0.0), pair("scale", 1.0));
-        let tex_coord = json.get("texCoord").and_then(serde_json::Value::as_u64).map_or(info.tex_coord(), |set| set as u32);
+        let tex_coord =
+            json.get("texCoord").and_then(serde_json::Value::as_u64).map_or(info.tex_coord(), |set| set as u32);
         Self { texture: info.texture(), tex_coord, matrix }
     }
 }
@@ -123,7 +127,10 @@ impl Collector {
     /// Names an image that is missing, empty, or not a PNG or JPEG.
     pub fn decode(self, document: &Document) -> Result<Vec<Image>> {
         let sources: Vec<gltf::Image<'_>> = document.gltf.images().collect();
-        self.used.par_iter().map(|&index| decode(document, &sources[index]).map_err(|error| error.at(format!("image {index}")))).collect()
+        self.used
+            .par_iter()
+            .map(|&index| decode(document, &sources[index]).map_err(|error| error.at(format!("image {index}"))))
+            .collect()
     }
 }
 
@@ -140,11 +147,15 @@ fn decode(document: &Document, image: &gltf::Image<'_>) -> Result<Image> {
         gltf::image::Source::View { view, .. } => accessor::view_bytes(document, &view)?.to_vec(),
         gltf::image::Source::Uri { uri, .. } => uri::read(uri, &document.base)?,
     };
-    let format = image::guess_format(&bytes).ok().filter(|format| matches!(format, image::ImageFormat::Png | image::ImageFormat::Jpeg));
+    let format = image::guess_format(&bytes)
+        .ok()
+        .filter(|format| matches!(format, image::ImageFormat::Png | image::ImageFormat::Jpeg));
     let format = format.ok_or_else(|| {
-        Error::input(format!("unknown image format: it starts with {:02x?}", &bytes[..bytes.len().min(4)])).help("PNG or JPEG")
+        Error::input(format!("unknown image format: it starts with {:02x?}", &bytes[..bytes.len().min(4)]))
+            .help("PNG or JPEG")
     })?;
-    let decoded = image::load_from_memory_with_format(&bytes, format).map_err(|error| Error::input(format!("cannot decode the image: {error}")))?;
+    let decoded = image::load_from_memory_with_format(&bytes, format)
+        .map_err(|error| Error::input(format!("cannot decode the image: {error}")))?;
     from_rgba(&decoded.into_rgba8())
 }
 
@@ -165,7 +176,8 @@ fn from_rgba(rgba: &image::RgbaImage) -> Result<Image> {
 impl Slot {
     /// Texture coordinates after the transform.
     pub fn transformed(&self, uv: [f32; 2]) -> [f64; 2] {
-        self.matrix.map(|row| f64::from(row[0]) * f64::from(uv[0]) + f64::from(row[1]) * f64::from(uv[1]) + f64::from(row[2]))
+        self.matrix
+            .map(|row| f64::from(row[0]) * f64::from(uv[0]) + f64::from(row[1]) * f64::from(uv[1]) + f64::from(row[2]))
     }
 
     /// Range of one channel over the whole image, 0..1, decoded.
@@ -209,7 +221,7 @@ mod tests {
     /// Node `Rotation` of the Khronos TextureTransformTest: the marker for a correct rotation lies on the arrow, whose axis is u = v.
     #[test]
     fn rotation_is_anticlockwise_in_the_image() {
-        let matrix = transform_matrix([0.0; 2], 0.392_699_1, [1.0; 2]);
+        let matrix = transform_matrix([0.0; 2], std::f32::consts::FRAC_PI_8, [1.0; 2]);
         let [u, v] = matrix.map(|row| row[0] * 0.420_952 + row[1] * 1.016_267 + row[2]);
         assert!((u - v).abs() < 1e-3, "{u} {v}");
     }

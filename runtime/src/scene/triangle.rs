@@ -74,14 +74,17 @@ pub fn flatten(instances: &[Instance], meshes: &Meshes, materials: &[Material], 
     if total > MOST_TRIANGLES {
         return Err(Error::input(format!("the scene has {total} triangles")).help(format!("at most {MOST_TRIANGLES}")));
     }
-    let moved_by = displacement(instances.iter().flat_map(|instance| primitives(instance).iter().map(move |p| (instance, p))));
+    let moved_by =
+        displacement(instances.iter().flat_map(|instance| primitives(instance).iter().map(move |p| (instance, p))));
     let mut triangles = Vec::with_capacity(total);
     for instance in instances {
         for primitive in primitives(instance) {
             let least_alpha = primitive.colors.iter().flatten().map(|color| color[3]).fold(1.0f32, f32::min);
             let alpha_tested = materials[primitive.material].alpha_tested(images, least_alpha);
             let placer = Placer::new(primitive, DMat4::from_translation(-moved_by) * instance.matrix, alpha_tested);
-            let outside = || Error::input("a vertex lies beyond the range of 32-bit floats").at(format!("node `{}`", instance.name));
+            let outside = || {
+                Error::input("a vertex lies beyond the range of 32-bit floats").at(format!("node `{}`", instance.name))
+            };
             let positions = placer.positions().ok_or_else(outside)?;
             triangles.extend((0..primitive.triangles.len()).filter_map(|i| placer.triangle(i, &positions)));
         }
@@ -143,10 +146,13 @@ impl<'a> Placer<'a> {
             normals = [face; 3];
         }
         let primitive = self.primitive;
-        let tangent = |i: usize| self.tangent(primitive.tangents.as_ref().map(|t| t[index][places[i]]), normals[i], inverted);
+        let tangent =
+            |i: usize| self.tangent(primitive.tangents.as_ref().map(|t| t[index][places[i]]), normals[i], inverted);
         Some(Triangle {
             positions,
-            uvs: [0, 1].map(|set: usize| corners.map(|vertex| primitive.uvs[set].as_ref().map_or([0.0; 2], |uvs| uvs[vertex]))),
+            uvs: [0, 1].map(|set: usize| {
+                corners.map(|vertex| primitive.uvs[set].as_ref().map_or([0.0; 2], |uvs| uvs[vertex]))
+            }),
             tangents: [tangent(0), tangent(1), tangent(2)],
             colors: corners.map(|vertex| primitive.colors.as_ref().map_or([1.0; 4], |colors| colors[vertex])),
             normals: normals.map(|normal| normal.as_vec3()),
@@ -213,7 +219,12 @@ mod tests {
 
     #[test]
     fn normals_move_by_the_inverse_transpose() {
-        let shear = DMat4::from_cols_array_2d(&[[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.5, 0.0, 2.0, 0.0], [0.0, 0.0, 0.0, 1.0]]);
+        let shear = DMat4::from_cols_array_2d(&[
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.5, 0.0, 2.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
         let triangle = placed(&primitive(), shear).unwrap();
         assert!((triangle.normals[0] - Vec3::Z).length() < 1e-6);
         assert!(!triangle.flat);
@@ -223,7 +234,10 @@ mod tests {
     fn triangles_without_area_are_dropped_and_slivers_stay() {
         assert!(placed(&primitive(), DMat4::from_scale(DVec3::ZERO)).is_none());
         assert!(placed(&primitive(), DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0))).is_none());
-        assert!(placed(&primitive(), DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0))).is_some_and(|t| (t.normals[1] - Vec3::Z).length() < 1e-6));
+        assert!(
+            placed(&primitive(), DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0)))
+                .is_some_and(|t| (t.normals[1] - Vec3::Z).length() < 1e-6)
+        );
         assert!(placed(&primitive(), DMat4::from_scale(DVec3::new(1.0, 1e-5, 1.0))).is_some());
         assert!(placed(&primitive(), DMat4::from_scale(DVec3::splat(1e-5))).is_some());
     }
@@ -241,7 +255,11 @@ mod tests {
     #[test]
     fn only_scenes_far_from_the_origin_are_moved() {
         let primitive = primitive();
-        let at = |x: f64| Instance { mesh: 0, matrix: DMat4::from_translation(DVec3::new(x, 0.0, 0.0)), name: String::new() };
+        let at = |x: f64| Instance {
+            mesh: 0,
+            matrix: DMat4::from_translation(DVec3::new(x, 0.0, 0.0)),
+            name: String::new(),
+        };
         assert_eq!(displacement([(&at(5.0), &primitive)].into_iter()), DVec3::ZERO);
         assert_eq!(displacement([(&at(1e4), &primitive)].into_iter()), DVec3::new(10000.5, 0.5, 0.0));
         assert_eq!(displacement(std::iter::empty()), DVec3::ZERO);

@@ -73,7 +73,10 @@ fn base64(text: &str) -> Result<Vec<u8>> {
     let (mut bits, mut held) = (0u32, 0);
     for c in text.bytes().filter(|c| !c.is_ascii_whitespace() && *c != b'=') {
         let Some(value) = base64_digit(c) else {
-            return Err(Error::input(format!("data URI has the character `{}` in its base64", char::from(c).escape_default())));
+            return Err(Error::input(format!(
+                "data URI has the character `{}` in its base64",
+                char::from(c).escape_default()
+            )));
         };
         bits = (bits << 6) | u32::from(value);
         held += 6;
