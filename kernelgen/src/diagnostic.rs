@@ -27,7 +27,7 @@ pub struct Label {
 
 /// One finding: code, message, labelled places, help.
 ///
-/// Codes: K01xx config, K02xx wiring, K03xx WGSL, K04xx layout, K05xx precision.
+/// Codes: K01xx config, K02xx wiring, K03xx WGSL, K04xx layout; `docs/diagnostics.md` lists them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
     /// How bad it is.
@@ -45,13 +45,7 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// An error without places yet.
     pub fn error(code: &'static str, message: impl Into<String>) -> Self {
-        Self {
-            severity: Severity::Error,
-            code,
-            message: message.into(),
-            labels: Vec::new(),
-            help: Vec::new(),
-        }
+        Self { severity: Severity::Error, code, message: message.into(), labels: Vec::new(), help: Vec::new() }
     }
 
     /// A warning without places yet.
@@ -93,27 +87,15 @@ pub fn render(diagnostics: &[Diagnostic], sources: &Sources, colour: bool) -> St
     out
 }
 
-fn render_one(
-    diagnostic: &Diagnostic,
-    files: &SimpleFiles<String, String>,
-    colour: bool,
-) -> String {
+fn render_one(diagnostic: &Diagnostic, files: &SimpleFiles<String, String>, colour: bool) -> String {
     let severity = match diagnostic.severity {
         Severity::Error => codespan::Severity::Error,
         Severity::Warning => codespan::Severity::Warning,
     };
     let labels = diagnostic.labels.iter().map(|label| {
-        let style = if label.primary {
-            codespan::LabelStyle::Primary
-        } else {
-            codespan::LabelStyle::Secondary
-        };
-        codespan::Label::new(
-            style,
-            label.span.file.0 as usize,
-            label.span.start as usize..label.span.end as usize,
-        )
-        .with_message(&label.message)
+        let style = if label.primary { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
+        codespan::Label::new(style, label.span.file.0 as usize, label.span.start as usize..label.span.end as usize)
+            .with_message(&label.message)
     });
     let notes = diagnostic.help.iter().map(|help| format!("help: {help}"));
     let shown = codespan::Diagnostic::new(severity)
@@ -179,7 +161,8 @@ mod tests {
     #[test]
     fn a_place_outside_of_its_text_loses_no_message() {
         let nowhere = Span { file: FileId(7), start: 0, end: 1 };
-        let lost = render(&[Diagnostic::warning("K0207", "odd").at(nowhere, "here").help("look")], &Sources::default(), false);
+        let lost =
+            render(&[Diagnostic::warning("K0207", "odd").at(nowhere, "here").help("look")], &Sources::default(), false);
         assert_eq!(lost, "warning[K0207]: odd\n  = help: look\n");
     }
 }

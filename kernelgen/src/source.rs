@@ -61,12 +61,7 @@ impl Sources {
         name: impl Into<String>,
         text: impl Into<String>,
     ) -> FileId {
-        self.files.push(SourceFile {
-            kind,
-            key: key.into(),
-            name: name.into(),
-            text: text.into(),
-        });
+        self.files.push(SourceFile { kind, key: key.into(), name: name.into(), text: text.into() });
         FileId(self.files.len() as u32 - 1)
     }
 

@@ -5,8 +5,8 @@ use crate::error::Error;
 use kernelgen::plan::{Access, Buffer, Plan, Role};
 use wgpu::BufferUsages;
 
-/// Path slots on a GPU when not asked otherwise: enough to fill the largest cards.
-const DEFAULT_PATHS_GPU: u64 = 1 << 20;
+/// Path slots on a GPU when not asked otherwise: enough to fill the largest cards and to hide the launches of a round.
+const DEFAULT_PATHS_GPU: u64 = 1 << 22;
 /// Path slots on a CPU adapter when not asked otherwise.
 const DEFAULT_PATHS_CPU: u64 = 1 << 17;
 /// The most that may be asked for: 32-bit ray counters must survive a pass of a thousand rounds.

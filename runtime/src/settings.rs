@@ -2,6 +2,7 @@
 
 use crate::configs::{Axis, Library};
 use crate::error::Error;
+use crate::scene::BuildPreset;
 use indexmap::IndexMap;
 use kernelgen::config::model::{Effects, Selection};
 use serde::{Deserialize, Serialize};
@@ -53,6 +54,15 @@ pub struct RenderFile {
     /// Further layers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aov: Vec<String>,
+    /// Radius of the camera's lens, m; 0 is a pinhole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lens_radius: Option<f32>,
+    /// Distance of the plane in focus, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focus_distance: Option<f32>,
+    /// Effort of building the acceleration structure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub build: Option<BuildPreset>,
     /// `--set` values.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub set: IndexMap<String, SetValue>,
@@ -167,6 +177,9 @@ impl RenderFile {
             env: over.env.or(self.env),
             env_scale: over.env_scale.or(self.env_scale),
             env_rotate: over.env_rotate.or(self.env_rotate),
+            lens_radius: over.lens_radius.or(self.lens_radius),
+            focus_distance: over.focus_distance.or(self.focus_distance),
+            build: over.build.or(self.build),
             aov: if over.aov.is_empty() { self.aov } else { over.aov },
             set,
             state: over.state.or(self.state),

@@ -118,7 +118,7 @@ fn every_scene_loads() {
                 .join(" ")
         );
         stats.warnings.iter().for_each(|warning| println!("    {warning}"));
-        scene.set_accelerator(Accelerator::Bvh2);
+        scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
         let binary = scene.stats().bvh.depth;
         println!("    binary depth {binary}");
         assert!(stats.bvh.depth <= DEEPEST_WIDE && binary <= DEEPEST_BINARY);
@@ -131,7 +131,7 @@ fn a_folder_is_its_scene_and_the_binary_hierarchy_is_built_on_demand() {
     let mut scene =
         scene::load(&folder.join("cornell_box"), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((scene.triangle_count(), scene.size()), (36, (512, 512)));
-    scene.set_accelerator(Accelerator::Bvh2);
+    scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
     assert!(scene.resource("bvh_nodes").is_none());
     assert_eq!(scene.resource("bvh2_nodes").map(|bytes| bytes.len() % 32), Some(0));
     let error = scene::load(&folder.join("loader_pack"), &LoadOptions::default()).err().map(|error| error.to_string());

@@ -34,10 +34,6 @@ mod tests {
 
     #[test]
     fn the_trace_stage_is_embedded() {
-        assert!(
-            modules()
-                .iter()
-                .any(|module| module.path == "stage/trace" && module.text.contains("fn trace("))
-        );
+        assert!(modules().iter().any(|module| module.path == "stage/trace" && module.text.contains("fn trace(")));
     }
 }

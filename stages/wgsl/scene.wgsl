@@ -14,10 +14,6 @@ struct Scene {
     bounds: vec4f,
     /// image width, image height, number of lights, number of triangles
     counts: vec4u,
-    /// width and height of the sky table, 0, index of the sky among the lights
-    sky: vec4u,
-    /// cosine and sine of the sky's rotation about +Y, pick probability of the sky as a light, 0
-    sky_rotation: vec4f,
 }
 
 var<uniform> scene: Scene;

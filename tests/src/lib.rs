@@ -3,6 +3,8 @@
 pub mod glb;
 pub mod how_to;
 pub mod material;
+pub mod probe;
+pub mod refuse;
 pub mod rendering;
 pub mod scene_builder;
 pub mod shape;

@@ -11,7 +11,6 @@ use runtime::image_file::Image;
 use runtime::render::{Rendered, Session, Settings, Until};
 use runtime::scene::{Accelerator, LoadOptions, Scene};
 use runtime::settings::{RenderFile, SetValue};
-use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -132,22 +131,32 @@ impl Job {
     /// Renders.
     #[track_caller]
     pub fn render(&self) -> Rendering {
+        let begun = std::time::Instant::now();
         let mut scene = self.load();
         let plan = self.generate(&scene);
         if plan.buffers.iter().any(|buffer| buffer.name == "bvh2_nodes") {
-            scene.set_accelerator(Accelerator::Bvh2);
+            scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
         }
         // A test that failed while it rendered leaves the device as it was: every render makes its own buffers.
         let gpu = GPU.lock().unwrap_or_else(PoisonError::into_inner);
         let settings = Settings { size: self.size, seed: self.seed, paths: None };
-        let resources = |name: &str| scene.resource(name).map(Cow::Borrowed);
+        let resources = |name: &str| scene.resource(name);
         let mut session =
             Session::new(&gpu, &plan, &resources, settings, Some(self.samples)).expect("the plan fits the device");
         for batch in 1..=u64::from(BATCHES) {
             let samples = u64::from(self.samples) * batch / u64::from(BATCHES);
             session.run(Until::Samples(samples as u32), &mut |_| true).expect("the render runs");
         }
-        rendering(&session.picture().expect("the picture can be read"))
+        let r = rendering(&session.picture().expect("the picture can be read"));
+        eprintln!(
+            "  [{:?} {:?} {}spp {:.1}s {:.2} Mrays]",
+            self.settings.pipeline,
+            self.size,
+            self.samples,
+            begun.elapsed().as_secs_f64(),
+            r.rays as f64 / 1e6
+        );
+        r
     }
 
     fn load(&self) -> Scene {
@@ -157,6 +166,7 @@ impl Job {
 
     fn generate(&self, scene: &Scene) -> Plan {
         let mut library = self.library.clone();
+        temporary_hook(&mut library);
         let selection =
             self.settings.selection(&mut library, scene.effects.clone()).unwrap_or_else(|error| panic!("{error}"));
         match kernelgen::generate(&library.sources, &selection) {
@@ -233,4 +243,24 @@ pub fn read_reference(path: &Path) -> Pixels {
     let image = Image::load(path).unwrap_or_else(|error| panic!("{error}"));
     let errors = image.standard_error.expect("a reference has standard errors");
     pixels(image.size, &image.radiance, &errors)
+}
+
+fn temporary_hook(library: &mut Library) {
+    use kernelgen::source::FileKind;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/wgsl");
+    let mutation = std::env::var("MUTATE").unwrap_or_default();
+    let parts: Vec<&str> = mutation.split("=>").collect();
+    let disk = std::env::var("DISK").is_ok();
+    for module in stages::modules() {
+        let mut text = if disk {
+            fs::read_to_string(root.join(format!("{}.wgsl", module.path))).unwrap()
+        } else {
+            module.text.to_owned()
+        };
+        if parts.len() == 3 && parts[0] == module.path {
+            assert!(text.contains(parts[1]), "no such text to mutate");
+            text = text.replace(parts[1], parts[2]);
+        }
+        library.sources.add(FileKind::Module, module.path, module.name, text);
+    }
 }

@@ -16,7 +16,8 @@ use kernelgen::diagnostic;
 use kernelgen::source::{FileKind, Sources};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use tests::refuse::{check, files, folder, project};
 
 const FOLDERS: [&str; 4] = ["pipelines", "layouts", "schedules", "precisions"];
 
@@ -37,22 +38,7 @@ const KNOWN: [&str; 11] = [
 
 #[test]
 fn refused_configs_say_why() {
-    let update = std::env::var_os("UPDATE_REFUSE").is_some();
-    let mut failures = Vec::new();
-    let cases = toml_files(&tests_folder().join("refuse/config"));
-    assert!(cases.len() >= 25, "only {} cases were found", cases.len());
-    for case in cases {
-        let expected_file = case.with_extension("stderr");
-        let shown = refuse(&case);
-        if update {
-            fs::write(&expected_file, &shown).expect("the expectation can be written");
-        }
-        let expected = fs::read_to_string(&expected_file).unwrap_or_default();
-        if shown != expected {
-            failures.push(format!("{}\n--- expected\n{expected}--- shown\n{shown}", case.display()));
-        }
-    }
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    check(&folder("config"), "toml", 25, refuse);
 }
 
 #[test]
@@ -172,10 +158,10 @@ fn default_selection() -> model::Selection {
 }
 
 fn real_configs(wanted: impl Fn(&str) -> bool) -> Sources {
-    let root = tests_folder().join("../configs");
+    let root = project().join("configs");
     let mut sources = Sources::default();
     for folder in FOLDERS {
-        for path in toml_files(&root.join(folder)) {
+        for path in files(&root.join(folder), "toml") {
             let name = path.file_name().expect("a file has a name").to_string_lossy();
             let key = format!("{folder}/{name}");
             if !wanted(&key) {
@@ -186,16 +172,4 @@ fn real_configs(wanted: impl Fn(&str) -> bool) -> Sources {
         }
     }
     sources
-}
-
-fn toml_files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).expect("the folder can be read");
-    let paths = entries.map(|entry| entry.expect("the folder can be read").path());
-    let mut files: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|ext| ext == "toml")).collect();
-    files.sort();
-    files
-}
-
-fn tests_folder() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }

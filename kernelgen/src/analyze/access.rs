@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 /// `bind` says which instance a parameter stands for; `outcomes` names the values that may be returned (zero is `end`).
 ///
 /// # Errors
-/// K0320 for a returned value that is no named outcome, K0322 for a parameter that is no pointer to a record or stands for no instance.
+/// K0208 when there is no such function, K0320 for a returned value that is no named outcome, K0322 for a parameter that is no pointer
+/// to a record or stands for no instance.
 pub fn stage_facts(
     module: &Module,
     linked: &Linked,
@@ -25,7 +26,7 @@ pub fn stage_facts(
 ) -> Result<StageFacts, Vec<Diagnostic>> {
     let found = module.functions.iter().find(|(_, candidate)| candidate.name.as_deref() == Some(function));
     let Some((handle, stage)) = found else {
-        return Err(vec![Diagnostic::error("K0322", format!("there is no function `{function}`"))]);
+        return Err(vec![Diagnostic::error("K0208", format!("there is no stage function `{function}`"))]);
     };
     let place = place_of(module.functions.get_span(handle), linked);
     let (leaves, params) = records(module, stage, function, place, bind)?;

@@ -8,7 +8,7 @@ use super::uses::Uses;
 use crate::link::Linked;
 use crate::source::Span;
 use naga::{Block, Expression, Function, Handle, LocalVariable, Module, Statement, SwitchCase, SwitchValue};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Rounds of a loop that are followed before what still changes is given up.
 const LOOP_ROUNDS: usize = 3;
@@ -61,7 +61,7 @@ struct Frame<'m> {
     depth: usize,
     arguments: Vec<Argument>,
     /// Values of expressions that have been evaluated.
-    values: HashMap<Handle<Expression>, Values>,
+    values: BTreeMap<Handle<Expression>, Values>,
     /// What holds at its returns so far.
     returned: Option<State>,
     result: Values,
@@ -118,7 +118,7 @@ impl<'m> Walk<'m> {
             function,
             depth,
             arguments,
-            values: HashMap::new(),
+            values: BTreeMap::new(),
             returned: None,
             result: Values::none(),
             exits: Vec::new(),

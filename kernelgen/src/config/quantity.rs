@@ -73,8 +73,18 @@ pub struct LeafShape {
 impl Quantity {
     /// The words accepted for `quantity`.
     pub const NAMES: [&'static str; 12] = [
-        "position", "unit_vector", "spectrum", "pdf", "mis_partial", "length", "weight", "uv", "hit", "index",
-        "counter", "flags",
+        "position",
+        "unit_vector",
+        "spectrum",
+        "pdf",
+        "mis_partial",
+        "length",
+        "weight",
+        "uv",
+        "hit",
+        "index",
+        "counter",
+        "flags",
     ];
 
     /// The word that names the quantity in a config.
@@ -114,11 +124,9 @@ impl Quantity {
             Quantity::Position | Quantity::UnitVector | Quantity::Spectrum => whole(LeafType::Vec3),
             Quantity::Pdf | Quantity::MisPartial | Quantity::Length | Quantity::Weight => whole(LeafType::Real),
             Quantity::Uv => whole(LeafType::Vec2),
-            Quantity::Hit => vec![
-                member("prim", LeafType::U32),
-                member("t", LeafType::Real),
-                member("uv", LeafType::Vec2),
-            ],
+            Quantity::Hit => {
+                vec![member("prim", LeafType::U32), member("t", LeafType::Real), member("uv", LeafType::Vec2)]
+            }
             Quantity::Index => whole(LeafType::U32),
             Quantity::Counter { bits } => vec![LeafShape { member: None, ty: LeafType::U32, bits: *bits }],
             Quantity::Flags { names } => {

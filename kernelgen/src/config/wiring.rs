@@ -19,7 +19,7 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
     check_stages(pipeline, findings);
     check_rounds(pipeline, findings);
     for stream in &variant.schedule.batch {
-        check_known(("K0214", "stream"), stream, &pipeline.streams, findings);
+        check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
     }
     check_tables(&variant.layout, pipeline, findings);
     check_places(&variant.layout, pipeline, findings);

@@ -81,7 +81,8 @@ impl Wiring {
 /// # Errors
 /// K0203 an outcome without a route, K0206 a parameter that is no instance, K0207 one of another record, K0208 a missing function,
 /// K0209 a stage that routes to itself, K0211 a consumer that asks for its path, K0212 a consumer that pushes, K0215 a function that
-/// is no stage, K0217 pushes to a batched stream in a loop; K03xx of the stage texts.
+/// is no stage, K0217 pushes to a batched stream in a loop, K0219 two parameters for one instance, K0220 an instance for a parameter
+/// that is not there, K0221 a consumer that takes something else than one record; K03xx of the stage texts.
 /// Warnings: K0204 an outcome that never comes, K0205 a stage that nothing reaches.
 pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Diagnostic>> {
     let mut wirer = Wirer {
@@ -392,7 +393,7 @@ fn check_stage_signature(
         if let Some(other) = taken.insert(bound.to_owned(), param.clone()) {
             let message = format!("parameters `{other}` and `{param}` of stage `{name}` both stand for `{bound}`");
             findings.push(
-                Diagnostic::error("K0206", message)
+                Diagnostic::error("K0219", message)
                     .at(stage.span, "wired here")
                     .also(place(param), "WGSL forbids two pointers to one variable")
                     .help(format!("give one of them another instance: `with.{param} = ..`")),
@@ -408,7 +409,7 @@ fn check_stage_signature(
             };
             let message = format!("stage `{name}` has no parameter `{param}`");
             findings.push(
-                Diagnostic::error("K0206", message)
+                Diagnostic::error("K0220", message)
                     .at(instance.span, "given here")
                     .also(entry.span, format!("`{}` does not have it", entry.name))
                     .help(help),
@@ -463,7 +464,7 @@ fn check_consumer_signature(name: &str, stream: &Stream, entry: &Entry, signatur
         _ => {
             let message = format!("the consumer of stream `{name}` must take one record");
             findings.push(
-                Diagnostic::error("K0206", message)
+                Diagnostic::error("K0221", message)
                     .at(entry.span, format!("its parameter should be `ptr<function, {record}>`, its only one"))
                     .also(stream.consumer.span, "wired here"),
             );

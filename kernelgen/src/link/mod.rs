@@ -78,7 +78,8 @@ pub struct Linked {
 ///
 /// # Errors
 /// K0301 lexical error or unbalanced brackets, K0302 two declarations of one name, K0303 import of a missing module or item
-/// (with the nearest name) that kept text uses, K0305 a resource with numbers of its own. Names that are neither declared nor imported are left to
+/// (with the nearest name) that kept text uses, K0305 a resource with numbers of its own, K0306 a path inside
+/// a declaration. Names that are neither declared nor imported are left to
 /// [`crate::analyze::parse`], which knows the built-in ones.
 pub fn link(
     sources: &Sources,

@@ -226,5 +226,5 @@ fn numbered_resources_and_paths_are_refused() {
         "@group(0) @binding(1) var<uniform> u: u32;\nfn root() { u; }\nfn path() { package::b::g(); }",
     )]);
     assert_eq!(project.refusal("a", "root").code, "K0305");
-    assert_eq!(project.refusal("a", "path").code, "K0303");
+    assert_eq!(project.refusal("a", "path").code, "K0306");
 }

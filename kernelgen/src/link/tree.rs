@@ -406,7 +406,7 @@ fn missing(message: String, from: Option<Span>, hint: Option<&str>) -> Diagnosti
 }
 
 fn inline_path(span: Span) -> Diagnostic {
-    Diagnostic::error("K0303", "a path inside a declaration")
+    Diagnostic::error("K0306", "a path inside a declaration")
         .at(span, "this path")
         .help("import the name at the top of the module and use it alone")
 }

@@ -10,7 +10,7 @@ use runtime::configs::{Axis, Library, is_path, with_scene};
 use runtime::device::{DeviceOptions, Gpu};
 use runtime::error::Error;
 use runtime::image_file::Image;
-use runtime::scene::{self, LoadOptions, Scene};
+use runtime::scene::{self, BuildPreset, LoadOptions, Scene};
 use runtime::settings::{Camera, RenderFile, SetValue};
 use std::path::Path;
 
@@ -55,6 +55,15 @@ pub struct SceneArguments {
     /// Turn of the sky about +Y, degrees
     #[arg(long, value_name = "DEG", value_parser = finite, allow_negative_numbers = true, help_heading = "Scene")]
     pub env_rotate: Option<f64>,
+    /// Radius of the camera's lens, metres; 0 is a pinhole
+    #[arg(long, value_name = "M", value_parser = non_negative, allow_negative_numbers = true, help_heading = "Scene")]
+    pub lens_radius: Option<f64>,
+    /// Distance of the plane in focus, metres; the centre of the scene when not given
+    #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true, help_heading = "Scene")]
+    pub focus_distance: Option<f64>,
+    /// Effort of building the acceleration structure
+    #[arg(long, value_name = "PRESET", value_parser = build_preset, help_heading = "Scene")]
+    pub build: Option<BuildPreset>,
 }
 
 /// Which device.
@@ -91,6 +100,12 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         Some(size) => Ok(size),
         None => Err("this is not WIDTHxHEIGHT, such as 640x360".to_owned()),
     }
+}
+
+fn build_preset(text: &str) -> Result<BuildPreset, String> {
+    let all = BuildPreset::ALL;
+    let named = all.into_iter().find(|preset| preset.name() == text);
+    named.ok_or_else(|| format!("valid presets are {}", all.map(BuildPreset::name).join(", ")))
 }
 
 /// A number above 0.
@@ -192,6 +207,9 @@ impl SceneArguments {
             env: self.env.clone(),
             env_scale: self.env_scale,
             env_rotate: self.env_rotate,
+            lens_radius: self.lens_radius.map(|radius| radius as f32),
+            focus_distance: self.focus_distance.map(|distance| distance as f32),
+            build: self.build,
             ..RenderFile::default()
         })
     }
@@ -209,6 +227,9 @@ pub fn load_scene(settings: &RenderFile) -> Result<Scene, Error> {
         env: settings.env.as_ref().map(Into::into),
         env_scale: settings.env_scale,
         env_rotate_deg: settings.env_rotate,
+        lens_radius: settings.lens_radius.unwrap_or(0.0),
+        focus_distance: settings.focus_distance,
+        build: settings.build.unwrap_or_default(),
         ..LoadOptions::default()
     };
     let scene = with_scene(word, |path| scene::load(path, &options))?;

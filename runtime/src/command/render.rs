@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut scene = input::load_scene(&settings)?;
     let generated = input::generate_settings(&mut settings, scene.effects.clone())?;
     let gpu = arguments.device.open()?;
-    scene.set_accelerator(accelerator(&generated.plan));
+    scene.set_accelerator(accelerator(&generated.plan))?;
     let size = scene.size().into();
     settings.size = Some(size);
     let seed = *settings.seed.get_or_insert(0);

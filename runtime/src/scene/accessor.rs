@@ -6,6 +6,8 @@ use gltf::accessor::{Accessor, DataType, Dimensions};
 
 /// More elements than this in one accessor is a broken file, not a scene.
 const MOST_ELEMENTS: usize = 1 << 30;
+/// The same for an accessor without a buffer view: nothing in the file bears out its count.
+const MOST_ZEROS: usize = 1 << 22;
 
 /// Where the elements of an accessor lie.
 struct Strided<'a> {
@@ -79,8 +81,10 @@ fn component_scale(accessor: &Accessor<'_>) -> Option<f64> {
 /// Components of all elements, exactly, and the number of elements.
 fn raw(document: &Document, accessor: &Accessor<'_>, components: usize) -> Result<(Vec<f64>, usize)> {
     let (count, data_type) = (accessor.count(), accessor.data_type());
-    if count > MOST_ELEMENTS {
-        return Err(Error::input(format!("count {count}")).help(format!("at most {MOST_ELEMENTS}")));
+    let (most, noun) =
+        if accessor.view().is_some() { (MOST_ELEMENTS, "") } else { (MOST_ZEROS, " without a buffer view") };
+    if count > most {
+        return Err(Error::input(format!("count {count}{noun}")).help(format!("at most {most}")));
     }
     let size = data_type.size() * components;
     let mut values = match accessor.view() {

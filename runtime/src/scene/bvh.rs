@@ -9,7 +9,11 @@ use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::ploc::PlocBuilder;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+
+/// Entries of the stacks with which the kernels traverse: `CWBVH_STACK` and `BVH2_STACK` in `stages/wgsl/trace`.
+const CWBVH_STACK: usize = 32;
+const BVH2_STACK: usize = 64;
 
 /// Which hierarchy the kernels traverse.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -22,8 +26,18 @@ pub enum Accelerator {
     Bvh2,
 }
 
+impl Accelerator {
+    /// The deepest hierarchy that the kernels can traverse: on the way down they put by one entry a level.
+    pub fn most_levels(self) -> usize {
+        match self {
+            Accelerator::Cwbvh => CWBVH_STACK,
+            Accelerator::Bvh2 => BVH2_STACK,
+        }
+    }
+}
+
 /// Time spent on building against time spent on tracing: obvhs' presets, without spatial splits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BuildPreset {
     /// Least effort.
@@ -40,6 +54,21 @@ pub enum BuildPreset {
 }
 
 impl BuildPreset {
+    /// All of them, from least effort to most.
+    pub const ALL: [BuildPreset; 5] =
+        [BuildPreset::VeryFast, BuildPreset::Fast, BuildPreset::Medium, BuildPreset::Slow, BuildPreset::VerySlow];
+
+    /// The word for it in settings and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            BuildPreset::VeryFast => "very_fast",
+            BuildPreset::Fast => "fast",
+            BuildPreset::Medium => "medium",
+            BuildPreset::Slow => "slow",
+            BuildPreset::VerySlow => "very_slow",
+        }
+    }
+
     fn parameters(self) -> BvhBuildParams {
         let parameters = match self {
             BuildPreset::VeryFast => BvhBuildParams::very_fast_build(),
@@ -304,6 +333,17 @@ mod tests {
                     check_cwbvh(&build(&triangles, Accelerator::Cwbvh, preset), &triangles);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_kernels_have_the_stacks_that_are_counted_on() {
+        for (path, declaration) in [
+            ("trace/cwbvh", format!("const CWBVH_STACK: u32 = {CWBVH_STACK}u;")),
+            ("trace/bvh2", format!("const BVH2_STACK: u32 = {BVH2_STACK}u;")),
+        ] {
+            let declared = |module: &stages::Module| module.path == path && module.text.contains(&declaration);
+            assert!(stages::modules().iter().any(declared), "{path}: {declaration}");
         }
     }
 

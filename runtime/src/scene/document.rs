@@ -114,8 +114,12 @@ fn check_extensions(root: &mut json::Root, warnings: &mut Vec<String>) -> Result
     Ok(())
 }
 
-/// Adds what the specification demands and nothing here needs: without it the validator refuses files that are fine otherwise.
+/// Adds what the specification demands and nothing here needs: without it the library refuses files that are fine otherwise.
 fn complete(root: &mut json::Root) {
+    for image in root.images.iter_mut().filter(|image| image.buffer_view.is_some()) {
+        // The format is told by the bytes.
+        image.mime_type.get_or_insert_with(|| json::image::MimeType(String::new()));
+    }
     let positions: Vec<_> = root
         .meshes
         .iter()
@@ -131,7 +135,7 @@ fn complete(root: &mut json::Root) {
     }
 }
 
-/// Checks what the library takes for granted when it hands out cameras, lights and attributes.
+/// Checks what the library takes for granted when it hands out cameras, attributes, images and lights.
 fn check_unions(root: &json::Root) -> Result<()> {
     for (index, camera) in root.cameras.iter().enumerate() {
         let present = match camera.type_ {
@@ -153,6 +157,9 @@ fn check_unions(root: &json::Root) -> Result<()> {
                     .at(format!("mesh {index}, primitive {number}")));
             }
         }
+    }
+    if let Some(index) = root.images.iter().position(|image| image.buffer_view.is_none() && image.uri.is_none()) {
+        return Err(Error::input("neither `uri` nor `bufferView`").at(format!("image {index}")).help("one of the two"));
     }
     let lights = root.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
     let lights = lights.map_or(&[][..], |extension| &extension.lights);

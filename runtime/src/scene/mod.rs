@@ -263,18 +263,29 @@ fn lens(camera: &Camera, options: &LoadOptions, centre: DVec3) -> Result<Lens> {
 
 impl Scene {
     /// The bytes of a resource by its WGSL name, at least 16. `None` for unknown names, and for the hierarchy that
-    /// [`LoadOptions::accelerator`] does not ask for. The hierarchy is built and each table packed when first asked for.
+    /// [`LoadOptions::accelerator`] does not ask for or the kernels cannot traverse. The hierarchy is built and each table packed when first asked for.
     pub fn resource(&self, name: &str) -> Option<&[u8]> {
         pack::resource(self, name)
     }
 
-    /// Changes which hierarchy is built: a scene is loaded before it is known which one its kernels read.
-    pub fn set_accelerator(&mut self, accelerator: Accelerator) {
+    /// Chooses the hierarchy, which is built if it is not there yet: a scene is loaded before it is known which one its kernels read.
+    ///
+    /// # Errors
+    /// User input: the hierarchy has more levels than the kernels can traverse. It is then no resource of this scene.
+    pub fn set_accelerator(&mut self, accelerator: Accelerator) -> Result<()> {
         if self.accelerator != accelerator {
             self.accelerator = accelerator;
             self.bvh = OnceLock::new();
             self.packed = pack::Packed::default();
         }
+        let (levels, most) = (self.bvh().depth, accelerator.most_levels());
+        if levels <= most {
+            return Ok(());
+        }
+        let message = format!("the hierarchy over its triangles has {levels} levels, the kernels traverse {most}");
+        Err(Error::input(message)
+            .in_file(&self.file)
+            .help("another `--build` preset, or triangles whose sizes differ less"))
     }
 
     /// Image width and height, pixels.

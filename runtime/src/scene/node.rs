@@ -41,10 +41,11 @@ pub struct Placements<'a> {
 /// Walks the default scene, else the first scene, else all nodes that are no other node's child.
 ///
 /// # Errors
-/// A node below itself, a transform that is not finite, instancing attributes that do not fit.
+/// A node below itself or below two nodes, a transform that is not finite, instancing attributes that do not fit.
 pub fn place<'a>(document: &'a Document, warnings: &mut Vec<String>) -> Result<Placements<'a>> {
     let mut placements = Placements::default();
     let nodes: Vec<gltf::Node<'a>> = document.gltf.nodes().collect();
+    check_parents(&nodes)?;
     let mut on_path = vec![false; nodes.len()];
     let mut stack: Vec<Step> =
         roots(document).into_iter().rev().map(|node| Step::Enter(node, DMat4::IDENTITY)).collect();
@@ -65,6 +66,20 @@ pub fn place<'a>(document: &'a Document, warnings: &mut Vec<String>) -> Result<P
         }
     }
     Ok(placements)
+}
+
+/// Nodes with two parents would be placed twice, and a chain of them without end.
+fn check_parents(nodes: &[gltf::Node<'_>]) -> Result<()> {
+    let mut parents = vec![None; nodes.len()];
+    for node in nodes {
+        for child in node.children() {
+            if let Some(other) = parents[child.index()].replace(node.index()) {
+                let message = format!("it is a child of node {other} and again of node {}", node.index());
+                return Err(Error::input(message).at(describe(&child)).help("one parent at most"));
+            }
+        }
+    }
+    Ok(())
 }
 
 enum Step {

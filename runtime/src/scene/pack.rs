@@ -16,7 +16,7 @@ const NO_LIGHT: u32 = u32::MAX;
 const LEAST_BYTES: usize = 16;
 
 /// Names of all resources.
-pub const RESOURCES: [&str; 15] = [
+pub const RESOURCES: [&str; 16] = [
     "bvh_nodes",
     "bvh2_nodes",
     "bvh_triangles",
@@ -31,19 +31,23 @@ pub const RESOURCES: [&str; 15] = [
     "light_alias",
     "sky_texels",
     "sky_alias",
+    "sky_frame",
     "scene",
 ];
 
 /// Packed resources, each made when first asked for; by place in [`RESOURCES`].
 pub type Packed = [OnceLock<Vec<u8>>; RESOURCES.len()];
 
-/// The bytes of a resource; `None` for an unknown name and for the hierarchy that the kernels do not read.
+/// The bytes of a resource; `None` for an unknown name and for a hierarchy that the kernels do not read or cannot traverse.
 pub fn resource<'a>(scene: &'a Scene, name: &str) -> Option<&'a [u8]> {
     let other_hierarchy = match scene.accelerator {
         Accelerator::Cwbvh => "bvh2_nodes",
         Accelerator::Bvh2 => "bvh_nodes",
     };
     let place = RESOURCES.iter().position(|&known| known == name && known != other_hierarchy)?;
+    if matches!(name, "bvh_nodes" | "bvh2_nodes") && scene.bvh().depth > scene.accelerator.most_levels() {
+        return None;
+    }
     Some(scene.packed[place].get_or_init(|| pack(scene, RESOURCES[place])))
 }
 
@@ -62,6 +66,7 @@ fn pack(scene: &Scene, name: &str) -> Vec<u8> {
         "light_alias" => bytes(&alias_words(&scene.lights.probabilities)),
         "sky_texels" => bytes(&scene.sky.as_ref().map_or(Vec::new(), |sky| sky.texels())),
         "sky_alias" => bytes(&scene.sky.as_ref().map_or(Vec::new(), |sky| alias_words(&sky.probabilities))),
+        "sky_frame" => bytes(&[sky_frame(scene)]),
         _ => bytes(&[uniform(scene)]),
     }
 }
@@ -220,18 +225,13 @@ fn alias_words(probabilities: &[f64]) -> Vec<[u32; 2]> {
     alias::table(probabilities).iter().map(|entry| [entry.threshold.to_bits(), entry.alias]).collect()
 }
 
-/// The uniform `Scene`: eight vec4.
-fn uniform(scene: &Scene) -> [[f32; 4]; 8] {
+/// The uniform `Scene`: six vec4.
+fn uniform(scene: &Scene) -> [[f32; 4]; 6] {
     let camera = &scene.camera;
     let origin = (camera.origin - scene.moved_by).as_vec3();
     let [right, up, forward] = camera.axes.map(|axis| axis.as_vec3());
     let (half_width, half_height) = camera.half_extent();
     let (centre, radius) = (scene.bounds.0.as_vec3(), scene.bounds.1);
-    let sky_light = scene.lights.sky_index();
-    let (sky_width, sky_height) = scene.sky.as_ref().map_or((1, 1), |sky| (sky.width, sky.height));
-    let (sin, cos) = scene.sky.as_ref().map_or(0.0, |sky| sky.rotation).sin_cos();
-    let sky_probability = sky_light.map_or(0.0, |index| scene.lights.probabilities[index]);
-    let bits = |words: [u32; 4]| words.map(f32::from_bits);
     [
         origin.extend(scene.lens.radius).to_array(),
         right.extend(half_width as f32).to_array(),
@@ -239,7 +239,22 @@ fn uniform(scene: &Scene) -> [[f32; 4]; 8] {
         forward.extend(scene.lens.focus_distance).to_array(),
         centre.extend(radius as f32).to_array(),
         bits([camera.size.0, camera.size.1, scene.lights.list.len() as u32, scene.triangles.len() as u32]),
-        bits([sky_width, sky_height, 0, sky_light.map_or(NO_LIGHT, |index| index as u32)]),
-        [cos as f32, sin as f32, sky_probability as f32, 0.0],
     ]
+}
+
+/// The uniform `SkyFrame`: two vec4.
+fn sky_frame(scene: &Scene) -> [[f32; 4]; 2] {
+    let light = scene.lights.sky_index();
+    let (width, height) = scene.sky.as_ref().map_or((1, 1), |sky| (sky.width, sky.height));
+    let (sin, cos) = scene.sky.as_ref().map_or(0.0, |sky| sky.rotation).sin_cos();
+    let probability = light.map_or(0.0, |index| scene.lights.probabilities[index]);
+    [
+        bits([width, height, 0, light.map_or(NO_LIGHT, |index| index as u32)]),
+        [cos as f32, sin as f32, probability as f32, 0.0],
+    ]
+}
+
+/// Four words in the place of four floats.
+fn bits(words: [u32; 4]) -> [f32; 4] {
+    words.map(f32::from_bits)
 }

@@ -6,6 +6,9 @@ use exr::prelude::{ReadChannels as _, ReadLayers as _};
 use std::f64::consts::PI;
 use std::path::Path;
 
+/// Most texels of a sky: their table of 2 GiB is what the largest devices bind at once.
+const MOST_TEXELS: usize = 1 << 27;
+
 /// A sky ready to be packed.
 pub struct Sky {
     /// Texels in a row.
@@ -49,20 +52,27 @@ fn pixels(path: &Path) -> Result<Pixels> {
         exr_pixels(&bytes)?
     } else if bytes.starts_with(b"#?") {
         // Not strict: the program that writes a file signs it `#?RGBE` as often as `#?RADIANCE`.
-        let decoder = image::codecs::hdr::HdrDecoder::new_nonstrict(bytes.as_slice());
-        let image = decoder.and_then(image::DynamicImage::from_decoder);
-        let image =
-            image.map_err(|error| Error::input(format!("cannot read the Radiance HDR file: {error}")))?.into_rgb32f();
+        let unreadable =
+            |error: image::ImageError| Error::input(format!("cannot read the Radiance HDR file: {error}"));
+        let decoder = image::codecs::hdr::HdrDecoder::new_nonstrict(bytes.as_slice()).map_err(unreadable)?;
+        check_size(decoder.metadata().width as usize, decoder.metadata().height as usize)?;
+        let image = image::DynamicImage::from_decoder(decoder).map_err(unreadable)?.into_rgb32f();
         (image.dimensions(), image.pixels().map(|pixel| pixel.0).collect())
     } else {
         return Err(
             Error::input("the sky is neither OpenEXR nor Radiance HDR").help("an .exr or .hdr file, equirectangular")
         );
     };
-    if size.0 == 0 || size.1 == 0 {
-        return Err(Error::input(format!("the sky is {}x{}", size.0, size.1)).help("at least 1x1"));
-    }
     Ok((size, radiance))
+}
+
+/// Before anything of that size is allocated.
+fn check_size(width: usize, height: usize) -> Result<()> {
+    match width.checked_mul(height) {
+        Some(1..=MOST_TEXELS) => Ok(()),
+        _ => Err(Error::input(format!("the sky is {width}x{height}"))
+            .help(format!("1x1 to {MOST_TEXELS} texels, such as 16384x8192"))),
+    }
 }
 
 fn exr_pixels(bytes: &[u8]) -> Result<Pixels> {

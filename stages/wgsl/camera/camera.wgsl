@@ -47,15 +47,15 @@ fn lens_point(random: vec2r) -> vec3r {
     return vec3r(real(scene.camera_origin.w) * sample_disk(random), 0.0);
 }
 
-/// Primary ray through `raster` (pixels, y downwards); `lens` chooses the lens point.
-fn camera_ray(raster: vec2r, lens: vec2r) -> CameraRay {
+/// Primary ray through `raster` (pixels, y downwards); `random`, in [0,1), places its origin.
+fn camera_ray(raster: vec2r, random: vec2r) -> CameraRay {
     let size = vec2r(scene.counts.xy);
     let plane = image_half_size() * (2.0 * raster / size - 1.0) * vec2r(1.0, -1.0);
     var direction = vec3r(plane, 1.0);
     var ray: CameraRay;
     ray.origin = vec3r(scene.camera_origin.xyz);
     if HAS_LENS {
-        let offset = lens_point(lens);
+        let offset = lens_point(random);
         direction = direction * real(scene.camera_forward.w) - offset;
         ray.origin += camera_to_world(offset);
     }
@@ -70,13 +70,13 @@ fn camera_pdf_w(cosine: real) -> real {
     return 1.0 / (4.0 * half_size.x * half_size.y * cosine * cosine * cosine);
 }
 
-/// Joins a point of the scene to a lens point drawn with `lens`; the line's crossing of the focus plane gives the pixel.
-fn connect_camera(point: vec3r, lens: vec2r) -> CameraConnection {
+/// Joins a point of the scene to a lens point drawn with `random`; the line's crossing of the focus plane gives the pixel.
+fn connect_camera(point: vec3r, random: vec2r) -> CameraConnection {
     var connection: CameraConnection;
     connection.position = vec3r(scene.camera_origin.xyz);
     var offset = vec3r(0.0);
     if HAS_LENS {
-        offset = lens_point(lens);
+        offset = lens_point(random);
         connection.position += camera_to_world(offset);
     }
     let span = point - connection.position;

@@ -10,8 +10,8 @@ import package::light::directional_light::emit_directional_light;
 import package::light::sky::emit_sky;
 
 /// A light, and a ray that leaves it. `random`: xy place on the light (for the sky: within its texel), zw choice of the
-/// light; `direction`: xy direction (for lights at infinity: place on the disk), z side; `texel`: the sky's texel (xyz).
-fn sample_emission(random: vec4r, direction: vec4r, texel: vec4r) -> Emission {
+/// light; `direction`: xy direction (for lights at infinity: place on the disk), z side; `extra`: further numbers (the sky's texel: xyz).
+fn sample_emission(random: vec4r, direction: vec4r, extra: vec4r) -> Emission {
     let light = pick_light(random.zw);
     let kind = light_kind(light);
     if HAS_AREA_LIGHT && kind == LIGHT_TRIANGLE {
@@ -24,7 +24,7 @@ fn sample_emission(random: vec4r, direction: vec4r, texel: vec4r) -> Emission {
         return emit_directional_light(light, direction.xy);
     }
     if HAS_SKY && kind == LIGHT_SKY {
-        return emit_sky(light, random.xy, direction, texel);
+        return emit_sky(light, random.xy, direction, extra);
     }
     var nothing: Emission;
     return nothing;

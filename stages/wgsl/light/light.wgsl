@@ -11,8 +11,8 @@ import package::light::directional_light::sample_directional_light;
 import package::light::sky::sample_sky;
 
 /// A light, and a point or direction of it, for a receiving surface. `random`: xy on the light, zw its choice;
-/// `texel`: the sky's texel (xyz).
-fn sample_light(receiver: Surface, random: vec4r, texel: vec4r) -> LightSample {
+/// `extra`: further numbers (the sky's texel: xyz).
+fn sample_light(receiver: Surface, random: vec4r, extra: vec4r) -> LightSample {
     let light = pick_light(random.zw);
     let kind = light_kind(light);
     if HAS_AREA_LIGHT && kind == LIGHT_TRIANGLE {
@@ -25,7 +25,7 @@ fn sample_light(receiver: Surface, random: vec4r, texel: vec4r) -> LightSample {
         return sample_directional_light(light, receiver);
     }
     if HAS_SKY && kind == LIGHT_SKY {
-        return sample_sky(light, receiver, random.xy, texel);
+        return sample_sky(light, receiver, random.xy, extra);
     }
     var nothing: LightSample;
     return nothing;

@@ -3,13 +3,21 @@
 import package::real::{real, vec2r, vec3r, vec4r};
 import package::math::constants::{INVERSE_PI, INVERSE_TWO_PI, PI, TWO_PI};
 import package::math::elementary::{arc_tangent2, cosine, sine};
-import package::scene::scene;
 import package::surface::surface::Surface;
 import package::light::table::pick_probability;
 import package::light::light_sample::LightSample;
 import package::light::emission_sample::Emission;
 import package::light::directional_light::{origin_at_infinity, pdf_disk, segment_to_infinity};
 
+/// How the table lies in the world.
+struct SkyFrame {
+    /// Width and height of the table, 0, index of the sky among the lights.
+    size: vec4u,
+    /// Cosine and sine of the table's turn about +Y, pick probability of the sky as a light, 0.
+    turn: vec4f,
+}
+
+var<uniform> sky_frame: SkyFrame;
 /// Radiance in W/(m2 sr), and the density of sampled directions times sin(theta), per sr.
 var<storage, read> sky_texels: array<vec4f>;
 /// Per texel: bits of the alias threshold, alias.
@@ -27,7 +35,7 @@ struct SkyPoint {
 
 /// Table coordinates of a unit direction. The polar angle comes from both coordinates, exact near the poles.
 fn sky_point(direction: vec3r) -> SkyPoint {
-    let turn = vec2r(scene.sky_rotation.xy);
+    let turn = vec2r(sky_frame.turn.xy);
     let x = direction.x * turn.x - direction.z * turn.y;
     let z = direction.x * turn.y + direction.z * turn.x;
     var point: SkyPoint;
@@ -40,7 +48,7 @@ fn sky_point(direction: vec3r) -> SkyPoint {
 
 /// The direction that table coordinates stand for: the inverse of `sky_point`.
 fn sky_point_at(uv: vec2r) -> SkyPoint {
-    let turn = vec2r(scene.sky_rotation.xy);
+    let turn = vec2r(sky_frame.turn.xy);
     var point: SkyPoint;
     point.uv = uv;
     point.sine_polar = sine(PI * uv.y);
@@ -52,14 +60,14 @@ fn sky_point_at(uv: vec2r) -> SkyPoint {
 
 /// Texel of the table that holds the coordinates.
 fn sky_texel(uv: vec2r) -> u32 {
-    let size = scene.sky.xy;
+    let size = sky_frame.size.xy;
     let texel = min(vec2u(uv * vec2r(size)), size - vec2u(1u));
     return texel.y * size.x + texel.x;
 }
 
 /// Radiance of the sky, bilinear between texel centres, periodic in azimuth.
 fn sky_radiance_at(uv: vec2r) -> vec3r {
-    let size = vec2i(scene.sky.xy);
+    let size = vec2i(sky_frame.size.xy);
     let place = uv * vec2r(size) - vec2r(0.5);
     let base = floor(place);
     let blend = place - base;
@@ -79,12 +87,12 @@ fn sky_radiance(direction: vec3r) -> vec3r {
 /// Density with which `sample_light` draws this direction as one of the sky, pick probability included, per sr.
 fn sky_pdf_w(direction: vec3r) -> real {
     let point = sky_point(direction);
-    return real(scene.sky_rotation.z) * real(sky_texels[sky_texel(point.uv)].w) / point.sine_polar;
+    return real(sky_frame.turn.z) * real(sky_texels[sky_texel(point.uv)].w) / point.sine_polar;
 }
 
 /// A direction in proportion to radiance: `random` places it in a texel, `texel` picks that (row, column, threshold).
 fn sample_sky_point(random: vec2r, texel: vec4r) -> SkyPoint {
-    let size = scene.sky.xy;
+    let size = sky_frame.size.xy;
     let slot = min(vec2u(texel.yx * vec2r(size)), size - vec2u(1u));
     let index = slot.y * size.x + slot.x;
     let entry = sky_alias[index];

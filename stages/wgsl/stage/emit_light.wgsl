@@ -5,7 +5,7 @@ import package::params::max_edges;
 import package::features::{HAS_AREA_LIGHT, HAS_ATTENUATION, HAS_DIRECTIONAL_LIGHT, HAS_POINT_LIGHT, HAS_SKY, HAS_SPOT_LIGHT};
 import package::random::{DIMENSION_EMIT, WALK_LIGHT, random4};
 import package::light::emission::sample_emission;
-import package::transport::dimension::{DIMENSION_DIRECTION, random_texel};
+import package::transport::dimension::{DIMENSION_DIRECTION, random_extra};
 import package::transport::medium::NO_MEDIUM;
 
 /// Starts a light walk at y_1, a point on a light. Its next vertex y_2 makes paths of two edges.
@@ -14,7 +14,7 @@ fn emit_light(walk: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     if HAS_AREA_LIGHT || HAS_POINT_LIGHT || HAS_SPOT_LIGHT || HAS_DIRECTIONAL_LIGHT || HAS_SKY {
         let random = random4(WALK_LIGHT, 1u, DIMENSION_EMIT);
         let direction = random4(WALK_LIGHT, 1u, DIMENSION_DIRECTION);
-        let emission = sample_emission(random, direction, random_texel(WALK_LIGHT, 1u));
+        let emission = sample_emission(random, direction, random_extra(WALK_LIGHT, 1u));
         walk.position = emission.origin;
         walk.direction = emission.direction;
         walk.throughput = emission.throughput;

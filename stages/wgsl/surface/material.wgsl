@@ -53,7 +53,10 @@ fn material_at(surface: Surface) -> Material {
             material.attenuation = vec3r(material_row(surface.material, 4u).xyz);
         }
     }
-    return textured_material(material, surface, flags);
+    if HAS_TEXTURE_METALLIC_ROUGHNESS || HAS_TEXTURE_TRANSMISSION || HAS_TEXTURE_SPECULAR {
+        material = textured_material(material, surface, flags);
+    }
+    return material;
 }
 
 /// Linear base colour in [0, 1].

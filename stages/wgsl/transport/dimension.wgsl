@@ -19,11 +19,11 @@ import package::random::random4;
 const DIMENSION_SKY: u32 = 4u;
 const DIMENSION_DIRECTION: u32 = 5u;
 
-/// The numbers that pick a texel of the sky; zero, and not drawn, in scenes without one.
-fn random_texel(walk: u32, vertex: u32) -> vec4r {
-    var texel = vec4r(0.0);
+/// Further numbers for lights that are tables and need more than four; zero, and not drawn, in scenes without a table.
+fn random_extra(walk: u32, vertex: u32) -> vec4r {
+    var extra = vec4r(0.0);
     if HAS_SKY {
-        texel = random4(walk, vertex, DIMENSION_SKY);
+        extra = random4(walk, vertex, DIMENSION_SKY);
     }
-    return texel;
+    return extra;
 }

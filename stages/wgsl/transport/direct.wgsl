@@ -10,12 +10,12 @@ import package::surface::surface::Surface;
 import package::surface::spawn::Segment;
 import package::light::light::sample_light;
 import package::light::light_sample::LightSample;
-import package::transport::dimension::random_texel;
+import package::transport::dimension::random_extra;
 import package::transport::medium::{medium_after, transmittance};
 
 /// Draws the light for next-event estimation at surface vertex `vertex` of the eye walk.
 fn direct_light(surface: Surface, vertex: u32) -> LightSample {
-    return sample_light(surface, random4(WALK_EYE, vertex, DIMENSION_LIGHT), random_texel(WALK_EYE, vertex));
+    return sample_light(surface, random4(WALK_EYE, vertex, DIMENSION_LIGHT), random_extra(WALK_EYE, vertex));
 }
 
 /// Offers light to the walk's pixel, if the segment to the light turns out free. `scattered` = f |cos| of the vertex,

@@ -6,7 +6,7 @@ import package::pass::path_pixel;
 import package::light::sky::sky_radiance;
 
 /// The light tracer's paths of one edge into the sky.
-fn see_sky(walk: ptr<function, Walk>) -> u32 {
+fn escape_lt(walk: ptr<function, Walk>) -> u32 {
     if HAS_SKY {
         splat(path_pixel(), walk.throughput * sky_radiance(walk.direction));
     }
