@@ -90,35 +90,45 @@ fn sky_pdf_w(direction: vec3r) -> real {
     return real(sky_frame.turn.z) * real(sky_texels[sky_texel(point.uv)].w) / point.sine_polar;
 }
 
+/// A drawn direction into the sky.
+struct SkySample {
+    point: SkyPoint,
+    /// Density times sin(theta), per sr, of the texel that was picked: the coordinates may be rounded into its neighbour, which may be black.
+    density: real,
+}
+
 /// A direction in proportion to radiance: `random` places it in a texel, `texel` picks that (row, column, threshold).
-fn sample_sky_point(random: vec2r, texel: vec4r) -> SkyPoint {
+fn sample_sky_direction(random: vec2r, texel: vec4r) -> SkySample {
     let size = sky_frame.size.xy;
     let slot = min(vec2u(texel.yx * vec2r(size)), size - vec2u(1u));
     let index = slot.y * size.x + slot.x;
     let entry = sky_alias[index];
     let picked = select(entry.y, index, texel.z < real(bitcast<f32>(entry.x)));
-    return sky_point_at((vec2r(vec2u(picked % size.x, picked / size.x)) + random) / vec2r(size));
+    var sample: SkySample;
+    sample.point = sky_point_at((vec2r(vec2u(picked % size.x, picked / size.x)) + random) / vec2r(size));
+    sample.density = real(sky_texels[picked].w);
+    return sample;
 }
 
 /// Light from a direction of the sky.
 fn sample_sky(light: u32, receiver: Surface, random: vec2r, texel: vec4r) -> LightSample {
-    let point = sample_sky_point(random, texel);
+    let drawn = sample_sky_direction(random, texel);
     var sample: LightSample;
-    sample.direction = point.direction;
-    sample.radiance = sky_radiance_at(point.uv);
-    sample.density = pick_probability(light) * real(sky_texels[sky_texel(point.uv)].w);
-    sample.cosine = point.sine_polar;
+    sample.direction = drawn.point.direction;
+    sample.radiance = sky_radiance_at(drawn.point.uv);
+    sample.density = pick_probability(light) * drawn.density;
+    sample.cosine = drawn.point.sine_polar;
     sample.segment = segment_to_infinity(receiver, sample.direction);
     return sample;
 }
 
 /// A ray of light out of the sky: throughput = L / (p_env p_disk).
 fn emit_sky(light: u32, random: vec2r, direction: vec4r, texel: vec4r) -> Emission {
-    let point = sample_sky_point(random, texel);
-    let density = pick_probability(light) * real(sky_texels[sky_texel(point.uv)].w) * pdf_disk();
+    let drawn = sample_sky_direction(random, texel);
+    let density = pick_probability(light) * drawn.density * pdf_disk();
     var emission: Emission;
-    emission.direction = -point.direction;
+    emission.direction = -drawn.point.direction;
     emission.origin = origin_at_infinity(emission.direction, direction.xy);
-    emission.throughput = sky_radiance_at(point.uv) * (point.sine_polar / density);
+    emission.throughput = sky_radiance_at(drawn.point.uv) * (drawn.point.sine_polar / density);
     return emission;
 }

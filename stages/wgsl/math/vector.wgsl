@@ -22,7 +22,8 @@ fn unit_scale(v: vec3r) -> vec3r {
 fn safe_normalize(v: vec3r, fallback: vec3r) -> vec3r {
     let scaled = unit_scale(v);
     let square = dot(scaled, scaled);
-    if square >= 1.0 {
+    // At least 1 but for the rounding of the division, which devices need not do correctly; 0 or not a number else.
+    if square > 0.5 {
         return scaled * inverseSqrt(square);
     }
     return fallback;
