@@ -159,6 +159,11 @@ fn resource(
     if bound.iter().any(|access| *access != Access::Uniform) {
         usage |= BufferUsages::STORAGE;
     }
+    let limit = binding_limit(gpu);
+    if bytes.len() as u64 > limit {
+        let error = too_large(gpu, name, bytes.len() as u64, limit);
+        return Err(error.help("a smaller sky, smaller textures or fewer triangles fit"));
+    }
     let made = create(gpu, name, bytes.len() as u64, usage)?;
     let whole = bytes.len() / 4 * 4;
     gpu.queue.write_buffer(&made, 0, &bytes[..whole]);

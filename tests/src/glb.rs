@@ -57,10 +57,15 @@ impl Buffer {
             document["bufferViews"] = json!(self.views);
             document["accessors"] = json!(self.accessors);
         }
-        let mut text = document.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-        container(&[(*b"JSON", &text), (*b"BIN\0", &self.bytes)])
+        file(&document, &self.bytes)
     }
+}
+
+/// A whole file of a document and its binary chunk, whose length is a multiple of four.
+pub fn file(document: &Value, bytes: &[u8]) -> Vec<u8> {
+    let mut text = document.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    container(&[(*b"JSON", &text), (*b"BIN\0", bytes)])
 }
 
 fn container(chunks: &[([u8; 4], &[u8])]) -> Vec<u8> {

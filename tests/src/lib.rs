@@ -10,4 +10,5 @@ pub mod scene_builder;
 pub mod shape;
 pub mod shipped_scenes;
 pub mod sky;
+pub mod small_scene;
 pub mod statistics;

@@ -133,7 +133,7 @@ impl Job {
     pub fn render(&self) -> Rendering {
         let begun = std::time::Instant::now();
         let mut scene = self.load();
-        let plan = self.generate(&scene);
+        let plan = self.generate(&scene).unwrap_or_else(|refusal| panic!("{refusal}"));
         if plan.buffers.iter().any(|buffer| buffer.name == "bvh2_nodes") {
             scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
         }
@@ -164,14 +164,22 @@ impl Job {
         runtime::scene::load(&self.scene, &options).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    fn generate(&self, scene: &Scene) -> Plan {
+    /// Whether the generator takes this pipeline with this layout and these settings.
+    ///
+    /// # Errors
+    /// What the generator has against it, as it is printed.
+    pub fn check(&self) -> Result<(), String> {
+        self.generate(&self.load()).map(drop)
+    }
+
+    fn generate(&self, scene: &Scene) -> Result<Plan, String> {
         let mut library = self.library.clone();
         temporary_hook(&mut library);
         let selection =
-            self.settings.selection(&mut library, scene.effects.clone()).unwrap_or_else(|error| panic!("{error}"));
+            self.settings.selection(&mut library, scene.effects.clone()).map_err(|error| error.to_string())?;
         match kernelgen::generate(&library.sources, &selection) {
-            Ok(generated) => generated.plan,
-            Err(refusal) => panic!("{}", refusal.render(false)),
+            Ok(generated) => Ok(generated.plan),
+            Err(refusal) => Err(refusal.render(false)),
         }
     }
 }
@@ -252,6 +260,11 @@ fn temporary_hook(library: &mut Library) {
     let parts: Vec<&str> = mutation.split("=>").collect();
     let disk = std::env::var("DISK").is_ok();
     for module in stages::modules() {
+        let own =
+            library.sources.find(FileKind::Module, module.path).map(|file| library.sources.file(file).text.clone());
+        if own.is_some_and(|own| own != module.text) {
+            continue;
+        }
         let mut text = if disk {
             fs::read_to_string(root.join(format!("{}.wgsl", module.path))).unwrap()
         } else {

@@ -4,7 +4,8 @@ use glam::{DVec3, dvec3};
 use tests::material::Material;
 use tests::rendering::{BuiltScene, Job, Rendering, shipped};
 use tests::scene_builder::{Camera, SceneBuilder};
-use tests::shape::sphere;
+use tests::shape::{Mesh, quad, sphere, turned_cuboid};
+use tests::sky::Sky;
 use tests::statistics::{spread, z_scores};
 
 const BLOCK: usize = 8;
@@ -13,8 +14,13 @@ const ROUNDING: f64 = 1e-4;
 
 #[track_caller]
 fn assert_agree(a: &Rendering, b: &Rendering, what: &str) {
+    assert_blocks_agree(a, b, BLOCK, what);
+}
+
+#[track_caller]
+fn assert_blocks_agree(a: &Rendering, b: &Rendering, block: usize, what: &str) {
     assert_eq!((a.rejected, b.rejected), (0, 0), "{what}: rejected contributions");
-    let spread = spread(&z_scores(&a.pixels.block_estimates(BLOCK), &b.pixels.block_estimates(BLOCK), ROUNDING));
+    let spread = spread(&z_scores(&a.pixels.block_estimates(block), &b.pixels.block_estimates(block), ROUNDING));
     assert!(spread.agrees(), "{what}: blocks {spread:?}");
     let (mean_a, mean_b) = (a.pixels.mean_estimate(), b.pixels.mean_estimate());
     let z = mean_a.z(&mean_b, ROUNDING * mean_a.mean);
@@ -64,24 +70,99 @@ fn lt_agrees_where_no_light_is_at_infinity() {
     scene.camera("main", Camera { eye: dvec3(0.0, 1.4, 4.5), target: dvec3(0.0, 0.7, 0.0), yfov: 40.0, aspect: 1.0 });
     let scene = BuiltScene::new(&scene, None);
     let job = scene.job().size(48, 48).edges(4);
-    let renders = render_all(&job, &[("pt", 256), ("lt", 512)]);
-    assert_agree(&renders[1], &renders[0], "lt and pt");
+    let renders = render_all(&job, &[("nee", 256), ("pt", 256), ("lt", 512)]);
+    assert_agree(&renders[0], &renders[1], "nee and pt");
+    assert_agree(&renders[2], &renders[1], "lt and pt");
+}
+
+/// Lights at infinity: a sun, and a sky that is bright on one side.
+#[test]
+fn nee_pt_and_lt_agree_under_sun_and_sky() {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(Material::lambert("floor", [0.6, 0.5, 0.4]));
+    let block = scene.material(Material::lambert("block", [0.3, 0.6, 0.7]));
+    scene.floor(floor, 0.0, 3.0);
+    scene.mesh(block, turned_cuboid(dvec3(-0.6, 0.0, -0.4), dvec3(0.1, 0.9, 0.3), 0.4));
+    scene.directional_light(dvec3(0.5, -1.0, -0.3), [1.5, 1.2, 0.8]);
+    scene.camera("main", Camera { eye: dvec3(0.3, 1.5, 4.0), target: dvec3(0.0, 0.3, 0.0), yfov: 38.0, aspect: 1.0 });
+    let sky = Sky::from_directions(32, 16, |towards| [0.2 + 0.8 * towards.x.max(0.0), 0.3, 0.6 + 0.4 * towards.y]);
+    let scene = BuiltScene::new(&scene, Some(&sky));
+    let job = scene.job().size(48, 48).edges(4);
+    let renders = render_all(&job, &[("nee", 256), ("pt", 256), ("lt", 1024)]);
+    assert_agree(&renders[0], &renders[1], "nee and pt");
+    assert_agree(&renders[2], &renders[1], "lt and pt");
+}
+
+/// Check 18: interpolated normals far from those of the triangles. Walks from the light must weigh them differently (Veach 1997, 5.3).
+#[test]
+fn lt_and_pt_agree_on_a_coarse_sphere_with_smooth_normals() {
+    let clay = Material::lambert("clay", [0.8, 0.5, 0.3]);
+    let scene = ball_beside_a_wall(clay, 3);
+    let renders = render_all(&scene.job().size(48, 48).edges(4), &[("nee", 512), ("pt", 512), ("lt", 4096)]);
+    // Facets are brighter and darker side by side: larger blocks would take the mean over them.
+    for block in [4, BLOCK] {
+        assert_blocks_agree(&renders[0], &renders[1], block, "nee and pt");
+        assert_blocks_agree(&renders[2], &renders[1], block, "lt and pt");
+    }
+}
+
+/// Microfacets, reflecting and refracting, with interpolated normals.
+#[test]
+fn lt_and_pt_agree_on_rough_glass_and_metal() {
+    let glass = Material::glass("glass", 1.5, 0.5);
+    let metal = Material::metal("metal", [0.9, 0.7, 0.4], 0.5);
+    let glaze = Material::glossy("glaze", [0.2, 0.4, 0.6], 0.5);
+    for material in [glass, metal, glaze] {
+        let name = material.name.clone();
+        let scene = ball_beside_a_wall(material, 8);
+        let renders = render_all(&scene.job().size(48, 48).edges(6), &[("pt", 256), ("lt", 512)]);
+        assert_agree(&renders[1], &renders[0], &name);
+    }
+}
+
+/// A ball of `rings` rings with smooth normals in the light of a panel, beside a wall that it colours.
+fn ball_beside_a_wall(material: Material, rings: u32) -> BuiltScene {
+    let mut scene = SceneBuilder::new();
+    let wall = scene.material(Material::lambert("wall", [0.7; 3]));
+    let ball = scene.material(material);
+    let light = scene.material(Material::emitter("light", [6.0; 3]));
+    scene.floor(wall, 0.0, 3.0);
+    scene.quad(wall, dvec3(-0.9, 0.0, 1.0), DVec3::NEG_Z * 2.0, DVec3::Y * 1.6);
+    scene.mesh(ball, sphere(dvec3(0.0, 0.6, 0.0), 0.5, rings));
+    scene.quad(light, dvec3(0.9, 1.3, -0.5), DVec3::new(0.4, 0.5, 0.0), DVec3::Z);
+    scene.camera("main", Camera { eye: dvec3(0.5, 1.0, 4.0), target: dvec3(-0.2, 0.5, 0.0), yfov: 32.0, aspect: 1.0 });
+    BuiltScene::new(&scene, None)
 }
 
 /// A caustic of a glass ball: walks from the camera find the light by chance, walks from the light find the floor.
 #[test]
-fn lt_and_pt_agree_on_a_caustic() {
+fn lt_and_pt_agree_on_a_caustic_of_glass() {
+    let glass = Material::glass("glass", 1.5, 0.0);
+    assert_caustics_agree(glass, sphere(dvec3(0.0, 0.6, 0.0), 0.4, 16).flat());
+}
+
+/// A caustic of a mirror whose normals are tilted towards the floor: deltas must weigh shading normals as other lobes do.
+#[test]
+fn lt_and_pt_agree_on_a_caustic_of_a_mirror() {
+    let mut plate = quad(dvec3(-0.6, 0.0, 1.0), DVec3::NEG_Z * 2.0, DVec3::Y * 1.5);
+    plate.normals = vec![dvec3(0.4f64.cos(), -0.4f64.sin(), 0.0); 4];
+    assert_caustics_agree(Material::metal("mirror", [0.9, 0.8, 0.7], 0.0), plate);
+}
+
+/// The floor beside or below a shape, in the light of a panel. The shape is out of the picture: walks from the light cannot be joined
+/// to a camera through smooth glass.
+#[track_caller]
+fn assert_caustics_agree(material: Material, shape: Mesh) {
     let mut scene = SceneBuilder::new();
     let floor = scene.material(Material::lambert("floor", [0.7; 3]));
-    let glass = scene.material(Material::glass("glass", 1.5, 0.0));
+    let material = scene.material(material);
     let light = scene.material(Material::emitter("light", [3.0; 3]));
     scene.floor(floor, 0.0, 4.0);
-    scene.mesh(glass, sphere(dvec3(0.0, 0.6, 0.0), 0.4, 16).flat());
+    scene.mesh(material, shape);
     scene.ceiling(light, 2.0, 1.6);
-    // The ball itself is out of the picture: walks from the light cannot be joined to a camera through smooth glass.
     scene.camera("main", Camera { eye: dvec3(0.0, 0.15, 3.0), target: dvec3(0.0, 0.0, 0.0), yfov: 6.0, aspect: 2.0 });
     let scene = BuiltScene::new(&scene, None);
     let job = scene.job().size(48, 24).edges(8);
-    let renders = render_all(&job, &[("pt", 2048), ("lt", 4096)]);
+    let renders = render_all(&job, &[("pt", 1024), ("lt", 2048)]);
     assert_agree(&renders[1], &renders[0], "lt and pt");
 }

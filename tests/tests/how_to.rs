@@ -50,14 +50,20 @@ fn module_key(path: &str) -> &str {
 #[test]
 fn a_layout_is_added() {
     let library = library_after("how-to-add-a-layout.md");
-    let job = |layout: &str| {
-        let job = Job::of_file(shipped("cornell_box")).library(library.clone()).layout(layout);
-        job.size(32, 32).samples(4).fixed_point().render()
-    };
-    let expected = job("aos");
-    assert!(expected.sums.iter().any(|&sum| sum != 0));
-    for layout in ["blocks_of_eight", "two_tables"] {
-        assert!(job(layout).sums == expected.sums, "the image of {layout} is not that of aos");
+    for (pipeline, layouts) in [
+        ("nee", &["blocks_of_eight", "two_tables"][..]),
+        ("pt", &["blocks_of_eight", "two_tables"]),
+        ("lt", &["blocks_of_eight"]),
+    ] {
+        let job = |layout: &str| {
+            let job = Job::of_file(shipped("cornell_box")).library(library.clone()).pipeline(pipeline).layout(layout);
+            job.size(32, 32).samples(4).fixed_point().render()
+        };
+        let expected = job("aos");
+        assert!(expected.sums.iter().any(|&sum| sum != 0));
+        for layout in layouts {
+            assert!(job(layout).sums == expected.sums, "{pipeline}: the image of {layout} is not that of aos");
+        }
     }
 }
 
@@ -76,6 +82,23 @@ fn a_bsdf_is_added() {
     assert!(dust.error < 0.005 * expected, "{dust:?} is too noisy to test anything");
     assert!(dust.z(&Estimate::exact(expected), 3e-4 * expected).abs() < 4.5, "{dust:?}, expected {expected}");
     assert!(lambert.z(&Estimate::exact(1.0), 3e-4).abs() < 4.5, "{lambert:?}, expected 1");
+}
+
+#[test]
+fn the_added_bsdf_works_below_a_coat() {
+    let library = library_after("how-to-add-a-bsdf.md");
+    let mut scene = SceneBuilder::new();
+    let ground = scene.material(Material::glossy("ground", [1.0; 3], 0.5));
+    scene.floor(ground, 0.0, 20.0);
+    scene.camera("main", Camera { eye: DVec3::Y, target: DVec3::ZERO, yfov: 0.1, aspect: 1.0 });
+    let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
+    let render = |model: &str| {
+        let job = scene.job().library(library.clone()).set("diffuse_model", model);
+        job.edges(2).size(16, 16).samples(256).render().pixels.mean_estimate().mean
+    };
+    let (dust, lambert) = (render("dust"), render("lambert"));
+    // The coat reflects 4 %; of the rest dust sends back less than a fifth.
+    assert!(0.04 < dust && dust < 0.24 && 0.9 < lambert && lambert < 1.01, "dust {dust}, lambert {lambert}");
 }
 
 #[test]

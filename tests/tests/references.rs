@@ -22,6 +22,7 @@ struct Reference {
     camera: u32,
     size: [u32; 2],
     max_edges: u32,
+    spp: u32,
 }
 
 /// The folder of scenes and references, or `None`, with a message that no test runner hides in its summary.
@@ -60,9 +61,19 @@ fn assert_converges_to(name: &str, shrink: u32, samples: u32, leave_out: impl Fn
     let Some(shared) = shared() else { return };
     let reference = reference(&shared, name);
     let expected = read_reference(&shared.join(format!("references/{name}.exr"))).shrunk(shrink as usize);
-    let rendering = job(&shared, &reference, shrink).pipeline("pt").samples(samples).render();
+    let mut rendering = job(&shared, &reference, shrink).pipeline("pt").samples(samples).render();
     assert_eq!(rendering.rejected, 0, "{name}: rejected contributions");
+    expect_errors(&mut rendering.pixels, &expected, reference.spp * shrink * shrink / samples);
     assert_agrees(&rendering, &expected, name, leave_out);
+}
+
+/// Raises standard errors to those that the reference foretells for so many times fewer samples. Where few paths find light, the
+/// error that few samples see of themselves is far too small when they have missed it; the reference has not.
+fn expect_errors(pixels: &mut Pixels, reference: &Pixels, times_fewer: u32) {
+    let growth = (times_fewer as f32).sqrt();
+    for (found, known) in pixels.errors.iter_mut().zip(&reference.errors) {
+        *found = std::array::from_fn(|channel| found[channel].max(growth * known[channel]));
+    }
 }
 
 #[track_caller]

@@ -11,6 +11,7 @@ import package::math::elementary::{arc_tangent2, cosine, power, sine};
 import package::math::frame::{Frame, frame_of, to_local, to_world};
 import package::sample::sphere::{sample_cone, sample_sphere};
 import package::surface::surface::Surface;
+import package::bsdf::dielectric::dielectric_half_vector;
 import package::bsdf::bsdf::{Bsdf, BsdfSample, IMPORTANCE, RADIANCE, bsdf_at, eval_bsdf, reverse_pdf_bsdf, sample_bsdf};
 import package::probe::bsdf_cases::{BsdfCase, bsdf_case};
 
@@ -83,6 +84,24 @@ fn count_samples() -> u32 {
     return DONE;
 }
 
+/// Counts a sample of a delta lobe like `count_samples`, in the case's first pixel if it leaves along the case's axis, in the second if it
+/// leaves along the mirrored direction, else in the third.
+fn count_deltas() -> u32 {
+    let probe = probe_here();
+    let random = random4(WALK_EYE, 1u, DIMENSION_SCATTER).xyz;
+    let sample = sample_bsdf(probe.bsdf, probe.outgoing, random, RADIANCE);
+    let importance = sample_bsdf(probe.bsdf, probe.outgoing, random, IMPORTANCE);
+    let mirrored = 2.0 * dot(probe.outgoing, probe.bsdf.frame.normal) * probe.bsdf.frame.normal - probe.outgoing;
+    var place = 2u;
+    if sample.delta && length(sample.direction - probe.axis.normal) < 1e-5 {
+        place = 0u;
+    } else if sample.delta && length(sample.direction - mirrored) < 1e-5 {
+        place = 1u;
+    }
+    splat(probe.first + place, vec3r(1.0, sample.weight.y, importance.weight.y));
+    return DONE;
+}
+
 /// Integrates over the path's own bin: density, f |cos| for radiance, f |cos| for importance.
 fn integrate_density() -> u32 {
     let probe = probe_here();
@@ -113,6 +132,17 @@ fn count_difference(first: u32, a: real, b: real) {
     }
 }
 
+/// Rounded unit vectors fix f well: no grazing directions, no grazed or nearly totally reflecting microfacet.
+fn is_well_conditioned(bsdf: Bsdf, a: vec3r, b: vec3r) -> bool {
+    let local_a = to_local(bsdf.frame, a);
+    let local_b = to_local(bsdf.frame, b);
+    let cosine_a = dot(local_a, dielectric_half_vector(local_a, local_b, bsdf.eta));
+    let cosine_b = dot(local_b, dielectric_half_vector(local_a, local_b, bsdf.eta));
+    let critical = 1.0 - (1.0 - cosine_a * cosine_a) / (bsdf.eta * bsdf.eta);
+    let least = min(min(abs(local_a.z), abs(local_b.z)), min(abs(cosine_a), abs(cosine_b)));
+    return min(least, abs(critical)) > 0.2;
+}
+
 /// Compares scattering from a to b with scattering from b to a. Rows: f of reflection; f of transmission over the squared index of the
 /// viewer's side; importance against radiance; the reverse density against the density.
 fn compare_turned() -> u32 {
@@ -128,6 +158,9 @@ fn compare_turned() -> u32 {
             return DONE;
         }
         b = sample.direction;
+    }
+    if !is_well_conditioned(bsdf, a, b) {
+        return DONE;
     }
     let turned = bsdf_at(probe.surface, probe.given.material, b);
     let ab = eval_bsdf(bsdf, a, b, RADIANCE);

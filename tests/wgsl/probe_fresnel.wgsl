@@ -1,30 +1,36 @@
-//! A table of reflectances: pixel x is its place in the test's list.
+//! A table of reflectances: a column for each entry of the test's list, a row for each part of an integral.
 
 import package::real::{real, vec3r};
 import package::outcome::DONE;
 import package::film::splat;
 import package::pass::{path_pixel, path_sample};
-import package::random::{DIMENSION_SCATTER, WALK_EYE, random4};
 import package::bsdf::fresnel::{fresnel_dielectric, fresnel_schlick};
 import package::bsdf::thin::thin_reflectance;
 
-/// Samples over which the hemispherical means are stratified.
-const STRATA: u32 = 4096u;
+const COLUMNS: u32 = 16u;
+const ROWS: u32 = 64u;
+/// Cells of a row, one for each sample.
+const CELLS: u32 = 256u;
 
-/// Cosine of an angle of incidence in diffuse light.
-fn diffuse_cosine() -> real {
-    let place = (real(path_sample() % STRATA) + random4(WALK_EYE, 1u, DIMENSION_SCATTER).x) / real(STRATA);
-    return sqrt(place);
+/// Cosine in the middle of the sample's cell of the hemispherical means.
+fn cell_cosine() -> real {
+    let cell = path_pixel() / COLUMNS * CELLS + path_sample() % CELLS;
+    return (real(cell) + 0.5) / real(ROWS * CELLS);
+}
+
+/// The sample's part of the mean reflectance in diffuse light, 2 cos F.
+fn diffuse_part(eta: real) -> real {
+    return 2.0 * cell_cosine() * fresnel_dielectric(cell_cosine(), eta);
 }
 
 fn tabulated(entry: u32) -> real {
     switch entry {
         case 0u: { return fresnel_dielectric(1.0, 1.5); }
         case 1u: { return fresnel_dielectric(1.0, 1.0 / 1.5); }
-        case 2u: { return fresnel_dielectric(diffuse_cosine(), 1.5); }
-        case 3u: { return fresnel_dielectric(diffuse_cosine(), 1.0 / 1.5); }
-        case 4u: { return fresnel_dielectric(diffuse_cosine(), 1.33); }
-        case 5u: { return fresnel_dielectric(diffuse_cosine(), 1.0 / 1.33); }
+        case 2u: { return diffuse_part(1.5); }
+        case 3u: { return diffuse_part(1.0 / 1.5); }
+        case 4u: { return diffuse_part(1.33); }
+        case 5u: { return diffuse_part(1.0 / 1.33); }
         // cosines of 41.8203 and 41.8003 degrees: on both sides of the critical angle 41.8103
         case 6u: { return fresnel_dielectric(0.7452396, 1.0 / 1.5); }
         case 7u: { return fresnel_dielectric(0.7454723, 1.0 / 1.5); }
@@ -32,7 +38,7 @@ fn tabulated(entry: u32) -> real {
         case 9u: { return thin_reflectance(1.0, 1.5); }
         case 10u: { return fresnel_schlick(vec3r(0.04), 1.0, 1.0).y; }
         case 11u: { return fresnel_schlick(vec3r(0.04), 1.0, 0.0).y; }
-        case 12u: { return fresnel_schlick(vec3r(0.04), 1.0, diffuse_cosine()).y; }
+        case 12u: { return 2.0 * cell_cosine() * fresnel_schlick(vec3r(0.04), 1.0, cell_cosine()).y; }
         // Brewster's angle, tan = 1.5: 0.5 ((1 - 1.5^2) / (1 + 1.5^2))^2
         case 13u: { return fresnel_dielectric(0.5547002, 1.5); }
         default: { return 0.0; }
@@ -40,6 +46,6 @@ fn tabulated(entry: u32) -> real {
 }
 
 fn tabulate_fresnel() -> u32 {
-    splat(path_pixel(), vec3r(tabulated(path_pixel())));
+    splat(path_pixel(), vec3r(tabulated(path_pixel() % COLUMNS)));
     return DONE;
 }

@@ -58,13 +58,20 @@ fn innermost(labels: Vec<&NagaLabel>) -> Vec<&NagaLabel> {
     labels.iter().copied().filter(|label| !is_outer(label)).collect()
 }
 
-/// naga's text without the numbers it gives things: `naga::ir::Expression [5]` says nothing to an author.
+/// naga's text without the numbers it gives things: `naga::ir::Expression [5]` says nothing to an author. A number that stands for a
+/// noun, as in `the type of [5]`, becomes one.
 fn without_numbers(text: &str) -> String {
+    const BEFORE_NOUNS: [&str; 5] = [" of", " in", " to", " with", " for"];
     let mut parts = text.split(" [");
     let mut out = parts.next().unwrap_or_default().replace("naga::ir::", "");
     for part in parts {
         match part.split_once(']') {
-            Some((number, rest)) if number.bytes().all(|byte| byte.is_ascii_digit()) => out.push_str(rest),
+            Some((number, rest)) if number.bytes().all(|byte| byte.is_ascii_digit()) => {
+                if BEFORE_NOUNS.iter().any(|word| out.ends_with(word)) {
+                    out.push_str(" a value");
+                }
+                out.push_str(rest);
+            }
             _ => {
                 out.push_str(" [");
                 out.push_str(part);

@@ -200,10 +200,11 @@ impl Builder<'_> {
         let name = &draft.name;
         if self.kernels.iter().any(|(kernel, _)| kernel.name == *name) {
             let message = format!("two kernels would be named `{name}`");
-            let start = self.program.variant.pipeline.start.span;
+            let pipeline = &self.program.variant.pipeline;
+            let place = pipeline.stages.get(name).map_or(pipeline.start.span, |stage| stage.span);
             return Err(vec![
                 Diagnostic::error("K0214", message)
-                    .at(start, "in this pipeline")
+                    .at(place, "in this pipeline")
                     .help(format!("rename the stage; `{name}` is a generated kernel")),
             ]);
         }

@@ -294,7 +294,8 @@ impl<'a> Splitter<'a> {
             let message = format!("`{name}` is imported from two modules");
             return Err(Diagnostic::error("K0302", message)
                 .at(span, format!("here from `package::{module}`"))
-                .also(earlier.span, format!("here from `package::{}`", earlier.module)));
+                .also(earlier.span, format!("here from `package::{}`", earlier.module))
+                .help("names are printed as they are written: import it from one of the two"));
         }
         self.module.imports.insert(name, Import { module, span });
         Ok(())

@@ -82,7 +82,9 @@ fn block_comment_end(file: FileId, text: &str, start: usize) -> Result<usize, Di
             at += 1;
         }
     }
-    Err(Diagnostic::error("K0301", "a block comment is not closed").at(span(file, start, start + 2), "opened here"))
+    Err(Diagnostic::error("K0301", "a block comment is not closed")
+        .at(span(file, start, start + 2), "opened here")
+        .help("close it with `*/`; block comments nest"))
 }
 
 fn token_at(file: FileId, text: &str, start: usize) -> Result<Token, Diagnostic> {
@@ -98,9 +100,9 @@ fn token_at(file: FileId, text: &str, start: usize) -> Result<Token, Diagnostic>
         (TokenKind::Punct, 1)
     } else {
         let message = format!("`{first}` is not part of WGSL");
-        return Err(
-            Diagnostic::error("K0301", message).at(span(file, start, start + first.len_utf8()), "this character")
-        );
+        return Err(Diagnostic::error("K0301", message)
+            .at(span(file, start, start + first.len_utf8()), "this character")
+            .help("take it away; comments begin with `//`"));
     };
     Ok(Token { kind, start, end: start + length })
 }
@@ -157,7 +159,9 @@ fn check_brackets(file: FileId, text: &str, tokens: &[Token]) -> Result<(), Diag
         None => Ok(()),
         Some(token) => {
             let message = format!("`{}` is never closed", &text[token.start..token.end]);
-            Err(Diagnostic::error("K0301", message).at(span(file, token.start, token.end), "opened here"))
+            Err(Diagnostic::error("K0301", message)
+                .at(span(file, token.start, token.end), "opened here")
+                .help("every `(`, `[` and `{` has its partner in the same module"))
         }
     }
 }
@@ -165,7 +169,8 @@ fn check_brackets(file: FileId, text: &str, tokens: &[Token]) -> Result<(), Diag
 fn unbalanced(file: FileId, text: &str, token: Token, opened: Option<Token>) -> Diagnostic {
     let message = format!("`{}` closes nothing", &text[token.start..token.end]);
     let diagnostic = Diagnostic::error("K0301", message)
-        .at(span(file, token.start, token.end), "no bracket of this kind is open here");
+        .at(span(file, token.start, token.end), "no bracket of this kind is open here")
+        .help("every `)`, `]` and `}` closes the bracket of its kind that was opened last");
     match opened {
         Some(opened) => diagnostic.also(span(file, opened.start, opened.end), "this one was opened last"),
         None => diagnostic,

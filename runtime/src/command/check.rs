@@ -14,8 +14,8 @@ use serde_json::json;
 use std::path::Path;
 
 /// Generates every combination of the shipped configs, or of the named files with all shipped configs of the other axes, for a
-/// scene with every effect and for the shipped Cornell box. A layout that places the fields of one pipeline by hand need only
-/// fit one.
+/// scene with every effect and for the shipped Cornell box. A layout with tables or a placement by hand, which name the
+/// instances or fields of one pipeline, need only fit one.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
     /// Configs to check; all shipped ones when not given
@@ -222,10 +222,13 @@ fn product(library: &Library, fixed: Option<(Axis, String)>) -> Vec<Selection> {
     all
 }
 
+/// Whether a layout names fields or instances, which are those of one pipeline.
 fn is_placed(library: &Library, layout: &str) -> bool {
     let places = |table: &toml::Table| {
-        let rows = table.get("layout").and_then(|layout| layout.get("place")).and_then(toml::Value::as_array);
-        rows.is_some_and(|rows| !rows.is_empty())
+        let layout = table.get("layout");
+        let rows = layout.and_then(|layout| layout.get("place")).and_then(toml::Value::as_array);
+        let tables = layout.and_then(|layout| layout.get("tables")).and_then(toml::Value::as_table);
+        rows.is_some_and(|rows| !rows.is_empty()) || tables.is_some_and(|tables| !tables.is_empty())
     };
     any_in_chain(library, layout, &places)
 }

@@ -181,6 +181,10 @@ fn output(arguments: &Arguments, settings: &RenderFile) -> Result<PathBuf, Error
     if !folder.is_dir() {
         return Err(Error::input(format!("the folder `{}` does not exist", folder.display())));
     }
+    // Better now than after hours of rendering.
+    if let Some(taken) = [path.clone(), path.with_extension("png")].iter().find(|file| file.is_dir()) {
+        return Err(Error::input(format!("the output `{}` is a folder", taken.display())).help("the name of a file"));
+    }
     Ok(path)
 }
 

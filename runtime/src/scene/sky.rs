@@ -52,8 +52,7 @@ fn pixels(path: &Path) -> Result<Pixels> {
         exr_pixels(&bytes)?
     } else if bytes.starts_with(b"#?") {
         // Not strict: the program that writes a file signs it `#?RGBE` as often as `#?RADIANCE`.
-        let unreadable =
-            |error: image::ImageError| Error::input(format!("cannot read the Radiance HDR file: {error}"));
+        let unreadable = |error: image::ImageError| Error::input(format!("cannot read the Radiance HDR file: {error}"));
         let decoder = image::codecs::hdr::HdrDecoder::new_nonstrict(bytes.as_slice()).map_err(unreadable)?;
         check_size(decoder.metadata().width as usize, decoder.metadata().height as usize)?;
         let image = image::DynamicImage::from_decoder(decoder).map_err(unreadable)?.into_rgb32f();
@@ -76,6 +75,11 @@ fn check_size(width: usize, height: usize) -> Result<()> {
 }
 
 fn exr_pixels(bytes: &[u8]) -> Result<Pixels> {
+    let unreadable = |error: exr::error::Error| Error::input(format!("cannot read the OpenEXR file: {error}"));
+    let described = exr::meta::MetaData::read_from_buffered(bytes, false).map_err(unreadable)?;
+    for header in &described.headers {
+        check_size(header.layer_size.width(), header.layer_size.height())?;
+    }
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -83,7 +87,7 @@ fn exr_pixels(bytes: &[u8]) -> Result<Pixels> {
         .first_valid_layer()
         .all_attributes()
         .from_buffered(std::io::Cursor::new(bytes))
-        .map_err(|error| Error::input(format!("cannot read the OpenEXR file: {error}")))?;
+        .map_err(unreadable)?;
     let layer = image.layer_data;
     let (width, height) = (layer.size.width(), layer.size.height());
     let names: Vec<String> = layer.channel_data.list.iter().map(|channel| channel.name.to_string()).collect();
