@@ -131,7 +131,6 @@ impl Job {
     /// Renders.
     #[track_caller]
     pub fn render(&self) -> Rendering {
-        let begun = std::time::Instant::now();
         let mut scene = self.load();
         let plan = self.generate(&scene).unwrap_or_else(|refusal| panic!("{refusal}"));
         if plan.buffers.iter().any(|buffer| buffer.name == "bvh2_nodes") {
@@ -147,16 +146,7 @@ impl Job {
             let samples = u64::from(self.samples) * batch / u64::from(BATCHES);
             session.run(Until::Samples(samples as u32), &mut |_| true).expect("the render runs");
         }
-        let r = rendering(&session.picture().expect("the picture can be read"));
-        eprintln!(
-            "  [{:?} {:?} {}spp {:.1}s {:.2} Mrays]",
-            self.settings.pipeline,
-            self.size,
-            self.samples,
-            begun.elapsed().as_secs_f64(),
-            r.rays as f64 / 1e6
-        );
-        r
+        rendering(&session.picture().expect("the picture can be read"))
     }
 
     fn load(&self) -> Scene {
@@ -174,7 +164,6 @@ impl Job {
 
     fn generate(&self, scene: &Scene) -> Result<Plan, String> {
         let mut library = self.library.clone();
-        temporary_hook(&mut library);
         let selection =
             self.settings.selection(&mut library, scene.effects.clone()).map_err(|error| error.to_string())?;
         match kernelgen::generate(&library.sources, &selection) {
@@ -251,29 +240,4 @@ pub fn read_reference(path: &Path) -> Pixels {
     let image = Image::load(path).unwrap_or_else(|error| panic!("{error}"));
     let errors = image.standard_error.expect("a reference has standard errors");
     pixels(image.size, &image.radiance, &errors)
-}
-
-fn temporary_hook(library: &mut Library) {
-    use kernelgen::source::FileKind;
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/wgsl");
-    let mutation = std::env::var("MUTATE").unwrap_or_default();
-    let parts: Vec<&str> = mutation.split("=>").collect();
-    let disk = std::env::var("DISK").is_ok();
-    for module in stages::modules() {
-        let own =
-            library.sources.find(FileKind::Module, module.path).map(|file| library.sources.file(file).text.clone());
-        if own.is_some_and(|own| own != module.text) {
-            continue;
-        }
-        let mut text = if disk {
-            fs::read_to_string(root.join(format!("{}.wgsl", module.path))).unwrap()
-        } else {
-            module.text.to_owned()
-        };
-        if parts.len() == 3 && parts[0] == module.path {
-            assert!(text.contains(parts[1]), "no such text to mutate");
-            text = text.replace(parts[1], parts[2]);
-        }
-        library.sources.add(FileKind::Module, module.path, module.name, text);
-    }
 }

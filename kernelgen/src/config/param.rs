@@ -17,7 +17,7 @@ pub fn read(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Para
     for item in &items {
         name::check("parameter", item, findings);
         let Some(section) = item.section(findings) else { continue };
-        section.allow(&["type", "value", "of", "doc"], findings);
+        section.allow(&["type", "value", "of", "max", "doc"], findings);
         let value = if is_declared(item) {
             value(item.name, &section, findings)
         } else {
@@ -57,7 +57,10 @@ fn value<'a>(name: &'a str, section: &Section<'a>, findings: &mut Findings) -> O
         findings.push(stray);
     }
     match TYPES[kind?] {
-        "u32" => Some(ParamValue::U32(item?.integer(0..=u32::MAX, findings)?)),
+        "u32" => {
+            let largest = section.get("max").and_then(|max| max.integer(0..=u32::MAX, findings));
+            Some(ParamValue::U32(item?.integer(0..=largest.unwrap_or(u32::MAX), findings)?))
+        }
         "real" => Some(ParamValue::Real(item?.real(findings)?)),
         "bool" => Some(ParamValue::Bool(item?.boolean(findings)?)),
         _ => choice(section, item?, findings),
