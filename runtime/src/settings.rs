@@ -109,7 +109,8 @@ pub enum SetValue {
 }
 
 impl SetValue {
-    fn word(&self) -> String {
+    /// The word for `--set`.
+    pub fn word(&self) -> String {
         match self {
             SetValue::Bool(value) => value.to_string(),
             SetValue::Integer(value) => value.to_string(),

@@ -75,6 +75,18 @@ impl Job {
         self
     }
 
+    /// The schedule.
+    pub fn schedule(mut self, name: &str) -> Job {
+        self.settings.schedule = Some(name.into());
+        self
+    }
+
+    /// The precision.
+    pub fn precision(mut self, name: &str) -> Job {
+        self.settings.precision = Some(name.into());
+        self
+    }
+
     /// Other configs and stages than the shipped ones.
     pub fn library(mut self, library: Library) -> Job {
         self.library = library;

@@ -123,7 +123,7 @@ fn add_config_modules(
         ("features", modules::features(&variant.effects)),
         ("params", modules::params(&pipeline.params)),
         ("pass", modules::PASS.to_owned()),
-        ("control", queue::control_module(&queues, kind)),
+        ("control", queue::control_module(&queues)),
         ("film", film::module(variant.schedule.accumulate)),
         ("streams", stream::analysis_module(pipeline)),
     ];
@@ -157,7 +157,7 @@ fn add_state_modules(
 ) {
     let kind = variant.schedule.queue;
     let texts = [
-        ("control", queue::control_module(queues, kind)),
+        ("control", queue::control_module(queues)),
         ("queue", queue::queue_module(queues, kind)),
         ("tables", memory::module(placement)),
         ("streams", stream::module(&variant.pipeline, wiring)),

@@ -58,7 +58,7 @@ pub(super) fn stream_constant(stream: &str) -> String {
 }
 
 /// `package::control`: counters that kernels and host share.
-pub(super) fn control_module(queues: &Queues, kind: QueueKind) -> String {
+pub(super) fn control_module(queues: &Queues) -> String {
     let mut text = String::new();
     for (name, word) in WORDS.iter().zip(0..) {
         let _ = writeln!(text, "const CONTROL_{}: u32 = {word}u;", name.to_uppercase());
@@ -78,10 +78,7 @@ pub(super) fn control_module(queues: &Queues, kind: QueueKind) -> String {
         WORDS.len() + 1,
     );
     text.push_str(COUNT_WALK_RAYS);
-    text.push_str(match kind {
-        QueueKind::Atomic => COUNT_RAY_ATOMIC,
-        QueueKind::Subgroup => COUNT_RAY_SUBGROUP,
-    });
+    text.push_str(COUNT_RAY);
     text
 }
 
@@ -96,20 +93,10 @@ fn walk_rays_word() -> u32 {
 }
 ";
 
-const COUNT_RAY_ATOMIC: &str = r"
+const COUNT_RAY: &str = r"
 /// Counts one ray of this invocation.
 fn count_ray(word: u32) {
     atomicAdd(&control[word], 1u);
-}
-";
-
-const COUNT_RAY_SUBGROUP: &str = r"
-/// Counts one ray of every invocation that is here, with one atomic.
-fn count_ray(word: u32) {
-    let rays = subgroupAdd(1u);
-    if subgroupExclusiveAdd(1u) == 0u {
-        atomicAdd(&control[word], rays);
-    }
 }
 ";
 
@@ -130,6 +117,7 @@ pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
         QueueKind::Atomic => ENQUEUE_ATOMIC,
         QueueKind::Subgroup => ENQUEUE_SUBGROUP,
     });
+    text.push_str(APPEND);
     let _ = write!(
         text,
         "{START_QUEUE}    let groups = (entries + {}u) / {}u;{START_QUEUE_END}",
@@ -155,11 +143,6 @@ fn enqueue(number: u32, wanted: bool, path: u32) {
         queue[number * path_count + place] = path;
     }
 }
-
-/// Takes the next place of a stream.
-fn append(number: u32) -> u32 {
-    return atomicAdd(&control[waiting_word(number)], 1u);
-}
 ";
 
 const ENQUEUE_SUBGROUP: &str = r"
@@ -177,16 +160,13 @@ fn enqueue(number: u32, wanted: bool, path: u32) {
         queue[number * path_count + base + rank] = path;
     }
 }
+";
 
-/// Takes the next place of a stream, with one atomic for all invocations that are here.
+/// Stages push where they please, so neighbours need not be there together: no subgroup operation can be relied on.
+const APPEND: &str = r"
+/// Takes the next place of a stream.
 fn append(number: u32) -> u32 {
-    let rank = subgroupExclusiveAdd(1u);
-    let records = subgroupAdd(1u);
-    var base = 0u;
-    if rank == 0u {
-        base = atomicAdd(&control[waiting_word(number)], records);
-    }
-    return subgroupBroadcastFirst(base) + rank;
+    return atomicAdd(&control[waiting_word(number)], 1u);
 }
 ";
 

@@ -1,0 +1,78 @@
+//! Every shipped config renders: each pipeline, layout, schedule and precision in at least one combination, and every render file.
+
+use runtime::configs::Axis;
+use runtime::settings::RenderFile;
+use std::collections::BTreeSet;
+use tests::rendering::{Job, shipped};
+
+/// One sample of a scene with every kind of light, small.
+fn job(pipeline: &str) -> Job {
+    Job::of_file(shipped("light_kinds")).pipeline(pipeline).size(16, 16).samples(1)
+}
+
+/// Pipelines that can be started; the others are there to be extended.
+fn pipelines() -> Vec<&'static str> {
+    let starts = |name: &&str| job(name).check().is_ok();
+    Axis::Pipeline.names().into_iter().filter(starts).collect()
+}
+
+fn assert_renders(job: &Job, what: &str) {
+    let rendering = job.render();
+    assert_eq!(rendering.rejected, 0, "{what}");
+    assert!(rendering.rays >= 256, "{what}: a primary ray for every pixel, not {}", rendering.rays);
+}
+
+#[test]
+fn every_pipeline_layout_and_schedule_renders_one_sample() {
+    let mut rendered = BTreeSet::new();
+    for pipeline in pipelines() {
+        for layout in Axis::Layout.names() {
+            for schedule in Axis::Schedule.names() {
+                let job = job(pipeline).layout(layout).schedule(schedule);
+                // A layout that places fields by hand fits the pipeline that it was written for.
+                if job.check().is_err() {
+                    continue;
+                }
+                assert_renders(&job, &format!("{pipeline}, {layout}, {schedule}"));
+                rendered.extend([("pipeline", pipeline), ("layout", layout), ("schedule", schedule)]);
+            }
+        }
+    }
+    for layout in Axis::Layout.names() {
+        assert!(rendered.contains(&("layout", layout)), "no pipeline fits layout `{layout}`");
+    }
+    for started in ["lt", "nee", "pt", "rays"] {
+        assert!(rendered.contains(&("pipeline", started)), "pipeline `{started}` is shipped and renders");
+    }
+}
+
+#[test]
+fn every_precision_renders_one_sample() {
+    for precision in Axis::Precision.names() {
+        assert_renders(&job("pt").precision(precision), precision);
+    }
+}
+
+#[test]
+fn every_render_file_renders_one_sample() {
+    for name in Axis::Render.names() {
+        let text = Axis::Render.shipped(name).expect("the name comes from the list");
+        let file = RenderFile::parse(text, name).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let scene = file.scene.as_deref().expect("a render file names its scene");
+        let mut job = Job::of_file(shipped(scene)).size(16, 16).samples(1);
+        for (key, value) in &file.set {
+            job = job.set(key, value.word());
+        }
+        for (word, choose) in [
+            (&file.pipeline, Job::pipeline as fn(Job, &str) -> Job),
+            (&file.layout, Job::layout),
+            (&file.schedule, Job::schedule),
+            (&file.precision, Job::precision),
+        ] {
+            if let Some(word) = word {
+                job = choose(job, word);
+            }
+        }
+        assert_renders(&job, name);
+    }
+}
