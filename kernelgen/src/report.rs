@@ -139,12 +139,7 @@ pub(crate) fn build(findings: &Findings<'_>) -> Report {
         bytes_per_path: findings.plan.bytes_per_path,
         tables: tables(findings, &leaves),
         kernels: kernels(findings),
-        dead: findings
-            .liveness
-            .dead
-            .iter()
-            .map(|(leaf, reason)| Reason { name: leaf.to_string(), reason: reason.clone() })
-            .collect(),
+        dead: leaves.iter().filter_map(|leaf| dead(findings, leaf)).collect(),
         effects: effects(findings),
         fields: leaves.iter().map(|leaf| field_use(findings, leaf)).collect(),
     }
@@ -251,6 +246,23 @@ fn field_use(findings: &Findings<'_>, declared: &StateLeaf) -> FieldUse {
         stored: findings.placement.slots.get(leaf).map(|slot| stored(findings.placement, slot)),
         dead: findings.liveness.dead.get(leaf).cloned(),
     }
+}
+
+/// Why a leaf that is stored nowhere needs no storage.
+fn dead(findings: &Findings<'_>, declared: &StateLeaf) -> Option<Reason> {
+    let leaf = &declared.leaf;
+    if findings.placement.slots.contains_key(leaf) {
+        return None;
+    }
+    let touches = |facts: &StageFacts| {
+        facts.reads.contains_key(leaf) || facts.writes.contains_key(leaf) || facts.maybe.contains_key(leaf)
+    };
+    let reason = match findings.liveness.dead.get(leaf) {
+        Some(reason) => reason.clone(),
+        None if findings.stages.iter().any(|(_, facts)| touches(facts)) => "lives within one kernel".to_owned(),
+        None => "no stage reads or writes it".to_owned(),
+    };
+    Some(Reason { name: leaf.to_string(), reason })
 }
 
 fn stored(placement: &Placement, slot: &layout::Slot) -> String {

@@ -115,7 +115,6 @@ fn add_config_modules(
     let state = modules::state(pipeline)?;
     // Stages are analysed against counters and queues of no stage: which there are follows from the analysis.
     let queues = Queues { workgroup: variant.schedule.workgroup.value, ..Queues::default() };
-    let kind = variant.schedule.queue;
     let texts = [
         ("real", modules::real(variant.precision.real)),
         ("state", state),
