@@ -71,7 +71,8 @@ fn check(scene: &Scene) {
     let total: f64 = lights.chunks_exact(16).map(|light| f64::from(light[1])).sum();
     assert!(lights.len() == 4 || (total - 1.0).abs() < 1e-5, "pick probabilities add up to {total}");
     check_light_links(scene, &lights);
-    assert_eq!(scene.resource("scene").map(<[u8]>::len), Some(128));
+    assert_eq!(scene.resource("scene").map(<[u8]>::len), Some(96));
+    assert_eq!(scene.resource("sky_frame").map(<[u8]>::len), Some(32));
 }
 
 /// Triangles and lights must name each other.
