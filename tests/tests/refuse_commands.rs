@@ -188,7 +188,10 @@ fn unknown_layer() {
 #[test]
 fn output_of_another_kind() {
     refused("output", &["render", "-o", "a.png"], &["`a.png` is not called .exr"]);
-    refused("output_folder", &["render", "-o", "no/such/a.exr"], &["folder `no/such` does not exist"]);
+    let folder = Folder::new("output_folder");
+    folder.write("taken", b"a file");
+    let words = ["`taken/such/a.exr` cannot be put into a file", "`taken` is not a folder"];
+    folder.refused(INPUT, &["render", "-o", "taken/such/a.exr"], &words);
 }
 
 /// Nobody can write a file where a folder is, whatever his rights.

@@ -177,11 +177,11 @@ fn output(arguments: &Arguments, settings: &RenderFile) -> Result<PathBuf, Error
         return Err(Error::input(format!("the output `{}` is not called .exr", path.display()))
             .help("the PNG is written beside it by itself"));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        return Err(Error::input(format!("the folder `{}` does not exist", folder.display())));
+    // Better now than after hours of rendering. Folders that are missing are made when there is something to put in.
+    if let Some(file) = path.ancestors().skip(1).find(|ancestor| ancestor.exists()).filter(|found| !found.is_dir()) {
+        return Err(Error::input(format!("the output `{}` cannot be put into a file", path.display()))
+            .help(format!("`{}` is not a folder", file.display())));
     }
-    // Better now than after hours of rendering.
     if let Some(taken) = [path.clone(), path.with_extension("png")].iter().find(|file| file.is_dir()) {
         return Err(Error::input(format!("the output `{}` is a folder", taken.display())).help("the name of a file"));
     }
@@ -242,6 +242,10 @@ fn write(
         },
         settings: Some(metadata.to_toml()?),
     };
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| Error::failed(format!("cannot make the folder: {error}")).in_file(folder))?;
+    }
     image.save(path)?;
     let png = path.with_extension("png");
     let exposure = exposure.map_or(Exposure::Percentile, |stops| Exposure::Stops(stops as f32));
