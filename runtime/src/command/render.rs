@@ -50,7 +50,7 @@ pub struct Arguments {
     /// Further layers: `variance` writes standard errors as sem.R, sem.G, sem.B
     #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
     aov: Vec<String>,
-    /// Brightness of the PNG in stops, 1 being white; by default the 99th percentile of the luminance is white
+    /// Brightness of the PNG in stops, 1 being white; by default the 95th percentile of the luminance is white
     #[arg(long, value_name = "STOPS", value_parser = input::finite, allow_negative_numbers = true)]
     exposure: Option<f64>,
     /// The EXR file to write; the PNG goes beside it
