@@ -338,15 +338,3 @@ place = [
     let shade = &kernel(&parts.plan, "shade").module;
     assert!(shade.contains("path.length = extractBits(state_2.w, 25u, 5u);"), "{shade}");
 }
-
-/// `cargo test -p kernelgen print_kernels -- --ignored --nocapture` shows what is generated.
-#[test]
-#[ignore = "prints"]
-fn print_kernels() {
-    let parts = generated(&[]);
-    for kernel in &parts.plan.kernels {
-        println!("==== {} {:?}\n{}", kernel.name, kernel.bindings, kernel.module);
-    }
-    println!("{:#?}\n{}", parts.plan.buffers, parts.report.text());
-    println!("{}", parts.report.field("eye.hit").unwrap());
-}
