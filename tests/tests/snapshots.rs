@@ -6,6 +6,7 @@ use kernelgen::config::model::{Effect, Effects, Selection};
 use kernelgen::source::FileKind;
 use runtime::configs::{Axis, Library};
 use runtime::scene::LoadOptions;
+use runtime::settings::RenderFile;
 use std::fmt::Write;
 
 /// The effects of the shipped Cornell box, or all that a scene may call for.
@@ -99,6 +100,37 @@ fn every_precision() {
     for precision in Axis::Precision.names() {
         let generated = generate(selection("pt", "soa", "wavefront", precision, false));
         insta::assert_snapshot!(format!("precision_{precision}"), text_of(&generated));
+    }
+}
+
+/// Each render file fixes a variant and a scene: the kernels that its picture comes from.
+#[test]
+fn every_render_file() {
+    for name in Axis::Render.names() {
+        let text = Axis::Render.shipped(name).expect("the name comes from the list");
+        let file = RenderFile::parse(text, name).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let scene = file.scene.as_deref().expect("a render file names its scene");
+        let loaded = runtime::scene::load(&tests::rendering::shipped(scene), &LoadOptions::default());
+        let selection = file
+            .selection(&mut Library::default(), loaded.expect("the shipped scene loads").effects)
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        insta::assert_snapshot!(format!("render_{name}"), text_of(&generate(selection)));
+    }
+}
+
+/// A file without `start` is there to be extended: here by the least pipeline that can run, one stage that ends at once.
+#[test]
+fn every_base_under_the_least_pipeline() {
+    for base in Axis::Pipeline.names().into_iter().filter(|name| !pipelines().contains(name)) {
+        let least = format!(
+            "doc = \"Least.\"\nextends = \"{base}.toml\"\nstart = \"emit_eye\"\nrounds = \"1\"\n[state]\neye = \"Walk\"\n\
+             [stages]\nemit_eye = {{ with.walk = \"eye\", on.emitted = \"end\" }}\n"
+        );
+        let mut library = Library::default();
+        library.sources.add(FileKind::Config, "pipelines/least.toml", "least.toml", least);
+        let generated = kernelgen::generate(&library.sources, &selection("least", "soa", "wavefront", "f32", false))
+            .unwrap_or_else(|refusal| panic!("{}", refusal.render(false)));
+        insta::assert_snapshot!(format!("base_{base}"), text_of(&generated));
     }
 }
 
