@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use kernelgen::source::{FileKind, Sources};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Shipped configs: path below `configs/` and text.
@@ -74,6 +74,8 @@ pub struct Library {
     pub sources: Sources,
     /// Texts that do not come with the program, by config key: they belong in the metadata of a picture.
     pub own: Vec<(String, String)>,
+    /// Stage modules that do not come with the program, by module key.
+    pub own_modules: Vec<(String, String)>,
 }
 
 impl Default for Library {
@@ -85,7 +87,7 @@ impl Default for Library {
         for module in stages::modules() {
             sources.add(FileKind::Module, module.path, module.name, module.text);
         }
-        Self { sources, own: Vec::new() }
+        Self { sources, own: Vec::new(), own_modules: Vec::new() }
     }
 }
 
@@ -120,6 +122,34 @@ impl Library {
         self.own.push((key.to_owned(), text.to_owned()));
     }
 
+    /// Adds a stage module, in place of the shipped one of the same key.
+    pub fn add_module(&mut self, key: &str, name: &str, text: &str) {
+        self.sources.add(FileKind::Module, key, name, text);
+        self.own_modules.push((key.to_owned(), text.to_owned()));
+    }
+
+    /// Adds every `.wgsl` file below a folder, by its path there (`bsdf/lambert.wgsl`): new modules, or others in place of shipped ones.
+    ///
+    /// # Errors
+    /// User input, when the folder cannot be read or holds no module.
+    pub fn add_module_folder(&mut self, folder: &Path) -> Result<(), Error> {
+        let mut files = Vec::new();
+        wgsl_files(folder, &mut files)
+            .map_err(|error| Error::input(format!("cannot read the folder of stages: {error}")).in_file(folder))?;
+        if files.is_empty() {
+            return Err(Error::input("there is no .wgsl file in this folder").in_file(folder));
+        }
+        files.sort();
+        for file in files {
+            let text = std::fs::read_to_string(&file)
+                .map_err(|error| Error::input(format!("cannot read the stage module: {error}")).in_file(&file))?;
+            let inside = file.strip_prefix(folder).unwrap_or(&file).with_extension("");
+            let key: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
+            self.add_module(&key.join("/"), &file.display().to_string(), &text);
+        }
+        Ok(())
+    }
+
     fn add_file(&mut self, key: &str, path: &Path) -> Result<(), Error> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| Error::input(format!("cannot read the file: {error}")).in_file(path))?;
@@ -135,6 +165,18 @@ impl Library {
         }
         Ok(())
     }
+}
+
+fn wgsl_files(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            wgsl_files(&path, files)?;
+        } else if path.extension().is_some_and(|extension| extension == "wgsl") {
+            files.push(path);
+        }
+    }
+    Ok(())
 }
 
 /// Whether a word of the command line is a file rather than a name.

@@ -27,6 +27,9 @@ pub struct RenderFile {
     /// Name or file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<String>,
+    /// Folder with WGSL modules that are added to the shipped ones or replace them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stages: Option<String>,
     /// Name, file or folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scene: Option<String>,
@@ -72,6 +75,9 @@ pub struct RenderFile {
     /// Texts of the configs that do not come with the program, by key; absent in render files.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub files: IndexMap<String, String>,
+    /// Texts of stage modules that do not come with the program, by module key; absent in render files.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub modules: IndexMap<String, String>,
 }
 
 /// How a camera is chosen.
@@ -146,12 +152,13 @@ impl RenderFile {
             &mut self.layout,
             &mut self.schedule,
             &mut self.precision,
+            &mut self.stages,
             &mut self.scene,
             &mut self.env,
         ];
         for word in words.into_iter().flatten() {
             let beside = folder.join(word.as_str());
-            if beside.is_file() {
+            if beside.is_file() || (crate::configs::is_path(word) && beside.is_dir()) {
                 *word = beside.to_string_lossy().into_owned();
             }
         }
@@ -164,6 +171,8 @@ impl RenderFile {
         set.extend(over.set);
         let mut files = std::mem::take(&mut self.files);
         files.extend(over.files);
+        let mut modules = std::mem::take(&mut self.modules);
+        modules.extend(over.modules);
         Self {
             doc: over.doc.or(self.doc),
             pipeline: over.pipeline.or(self.pipeline),
@@ -184,7 +193,9 @@ impl RenderFile {
             aov: if over.aov.is_empty() { self.aov } else { over.aov },
             set,
             state: over.state.or(self.state),
+            stages: over.stages.or(self.stages),
             files,
+            modules,
         }
     }
 
@@ -209,6 +220,12 @@ impl RenderFile {
         for (key, text) in &self.files {
             library.add_own(key, text);
         }
+        for (key, text) in &self.modules {
+            library.add_module(key, &format!("{key}.wgsl"), text);
+        }
+        if let Some(folder) = &self.stages {
+            library.add_module_folder(Path::new(folder))?;
+        }
         let mut key = |axis: Axis, word: &Option<String>| match word {
             Some(word) => library.resolve(axis, word),
             None => Err(Error::input(format!("no {} is chosen", axis.word()))),
@@ -226,6 +243,8 @@ impl RenderFile {
     /// Replaces files by their config keys, so that the settings no longer depend on where they lay: their texts go into `files`.
     pub fn pin(&mut self, selection: &Selection, library: &Library) {
         self.files = library.own.iter().cloned().collect();
+        self.modules = library.own_modules.iter().cloned().collect();
+        self.stages = None;
         let axes = [
             (&mut self.pipeline, &selection.pipeline),
             (&mut self.layout, &selection.layout),

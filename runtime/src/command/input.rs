@@ -29,6 +29,9 @@ pub struct VariantArguments {
     /// Precision: name or file
     #[arg(long, value_name = "P", help_heading = "Variant")]
     pub precision: Option<String>,
+    /// A folder with WGSL modules: new stages, or others in place of shipped ones (`bsdf/lambert.wgsl`)
+    #[arg(long, value_name = "DIR", help_heading = "Variant")]
+    pub stages: Option<String>,
     /// A pipeline parameter (`max_edges=8`) or a key of an axis (`schedule.workgroup=128`)
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value, help_heading = "Variant")]
     pub set: Vec<(String, String)>,
@@ -186,6 +189,7 @@ impl VariantArguments {
             layout: self.layout.clone(),
             schedule: self.schedule.clone(),
             precision: self.precision.clone(),
+            stages: self.stages.clone(),
             set,
             ..RenderFile::default()
         })

@@ -3,6 +3,7 @@
 
 import package::real::{real, vec3r};
 import package::features::{HAS_DELTA, HAS_DELTA_SPECULAR, HAS_DELTA_TRANSMISSION, HAS_DIFFUSE, HAS_METAL, HAS_NORMAL_MAP, HAS_ROUGH_SPECULAR, HAS_ROUGH_TRANSMISSION, HAS_SHADING_NORMALS, HAS_SOLID_GLASS, HAS_SPECULAR, HAS_THIN_GLASS, HAS_TRANSMISSION};
+import package::params::{refraction_adjoint, shading_normal_adjoint};
 import package::math::frame::{Frame, frame_of, to_local, to_world};
 import package::math::vector::max_component;
 import package::sample::hemisphere::{pdf_cosine_hemisphere, sample_cosine_hemisphere};
@@ -64,6 +65,8 @@ struct BsdfSample {
     delta: bool,
     /// Through the surface.
     transmitted: bool,
+    /// Drawn by the diffuse lobe.
+    diffuse: bool,
 }
 
 /// Non-delta scattering between two directions.
@@ -181,7 +184,7 @@ fn eval_bsdf(bsdf: Bsdf, outgoing: vec3r, incoming: vec3r, mode: u32) -> BsdfVal
     let local_incoming = to_local(bsdf.frame, incoming);
     let lobes = sum_lobes(bsdf, local_outgoing, local_incoming);
     result.value = lobes.f * scattering_cosine(bsdf, outgoing, incoming, mode);
-    if HAS_ROUGH_TRANSMISSION && HAS_SOLID_GLASS && mode == IMPORTANCE && local_incoming.z < 0.0 && bsdf.solid {
+    if HAS_ROUGH_TRANSMISSION && HAS_SOLID_GLASS && refraction_adjoint && mode == IMPORTANCE && local_incoming.z < 0.0 && bsdf.solid {
         // f*(o,i) = f(i,o): Walter et al. 2007, eq. 21 has the index of the viewer's side in its numerator.
         result.value *= bsdf.eta * bsdf.eta;
     }
@@ -206,12 +209,33 @@ fn reverse_pdf_bsdf(bsdf: Bsdf, outgoing: vec3r, incoming: vec3r) -> real {
     return sum_lobes(turned, local_incoming, local_outgoing).pdf;
 }
 
+/// The density of a sampled event in reverse: from `sample.direction` to `outgoing`, per sr; of a delta lobe the selection probability.
+fn reverse_pdf_of_sample(bsdf: Bsdf, outgoing: vec3r, sample: BsdfSample) -> real {
+    if HAS_DELTA {
+        if sample.delta {
+            return reverse_delta_pdf(bsdf, outgoing, sample);
+        }
+    }
+    return reverse_pdf_bsdf(bsdf, outgoing, sample.direction);
+}
+
+/// Probability of selecting the delta lobe that drew `sample` when the walk comes the other way. A mirror and a thin sheet have
+/// equal cosines on both ways; of an interface the reflectance is the same from both sides, but other lobes weigh differently.
+fn reverse_delta_pdf(bsdf: Bsdf, outgoing: vec3r, sample: BsdfSample) -> real {
+    if HAS_SOLID_GLASS && sample.transmitted {
+        let cosine = dot(outgoing, bsdf.frame.normal);
+        let far_cosine = abs(dot(sample.direction, bsdf.frame.normal));
+        return sample.pdf * lobe_probability(bsdf, far_cosine).glass / lobe_probability(bsdf, cosine).glass;
+    }
+    return sample.pdf;
+}
+
 /// Draws the direction in which the walk goes on. `random`: xy direction, z lobe, each in [0,1).
 fn sample_bsdf(bsdf: Bsdf, outgoing: vec3r, random: vec3r, mode: u32) -> BsdfSample {
     if HAS_SPECULAR || HAS_TRANSMISSION {
         return sample_lobe(bsdf, outgoing, random, mode);
     }
-    return direction_sample(bsdf, outgoing, sample_cosine_hemisphere(random.xy), mode);
+    return direction_sample(bsdf, outgoing, sample_cosine_hemisphere(random.xy), true, mode);
 }
 
 /// `sample_bsdf` where there is more than a diffuse lobe: selects a lobe by its probability, then a direction by the lobe.
@@ -223,6 +247,7 @@ fn sample_lobe(bsdf: Bsdf, outgoing: vec3r, random: vec3r, mode: u32) -> BsdfSam
     }
     let probability = lobe_probability(bsdf, local_outgoing.z);
     var local_incoming = vec3r(0.0);
+    var diffuse = false;
     if HAS_SPECULAR && random.z < probability.specular {
         if HAS_DELTA_SPECULAR && specular_is_delta(bsdf) {
             return sample_mirror(bsdf, outgoing, probability.specular, mode);
@@ -240,13 +265,15 @@ fn sample_lobe(bsdf: Bsdf, outgoing: vec3r, random: vec3r, mode: u32) -> BsdfSam
         }
     } else {
         local_incoming = sample_cosine_hemisphere(random.xy);
+        diffuse = true;
     }
-    return direction_sample(bsdf, outgoing, local_incoming, mode);
+    return direction_sample(bsdf, outgoing, local_incoming, diffuse, mode);
 }
 
 /// Completes a non-delta sample: the weight counts all lobes, whichever drew the direction. Zero: absorbed.
-fn direction_sample(bsdf: Bsdf, outgoing: vec3r, local_incoming: vec3r, mode: u32) -> BsdfSample {
+fn direction_sample(bsdf: Bsdf, outgoing: vec3r, local_incoming: vec3r, diffuse: bool, mode: u32) -> BsdfSample {
     var sample: BsdfSample;
+    sample.diffuse = diffuse;
     sample.direction = to_world(bsdf.frame, local_incoming);
     let scattered = eval_bsdf(bsdf, outgoing, sample.direction, mode);
     if scattered.pdf > 0.0 {
@@ -398,7 +425,7 @@ fn sample_delta_glass(bsdf: Bsdf, outgoing: vec3r, choice: real, probability: re
     var weight = share * bsdf.tint;
     if HAS_SOLID_GLASS && bsdf.solid {
         incoming = refract_smooth(local, bsdf.eta);
-        if mode == RADIANCE {
+        if mode == RADIANCE || !refraction_adjoint {
             weight /= bsdf.eta * bsdf.eta;
         }
     }
@@ -414,7 +441,7 @@ fn delta_sample(bsdf: Bsdf, outgoing: vec3r, local_incoming: vec3r, weight: vec3
         return sample;
     }
     sample.weight = weight;
-    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAP) && mode == IMPORTANCE {
+    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAP) && shading_normal_adjoint && mode == IMPORTANCE {
         sample.weight *= scattering_cosine(bsdf, outgoing, sample.direction, mode) / abs(local_incoming.z);
     }
     sample.pdf = pdf;
@@ -446,7 +473,7 @@ fn hemispheres_agree(bsdf: Bsdf, outgoing: vec3r, incoming: vec3r) -> bool {
 /// The cosine that multiplies f: |i.Ns| for radiance; for importance, where `outgoing` points to the light,
 /// |o.Ns| |i.Ng| / |o.Ng| (Veach 1997, section 5.3), which keeps the transport adjoint under shading normals.
 fn scattering_cosine(bsdf: Bsdf, outgoing: vec3r, incoming: vec3r, mode: u32) -> real {
-    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAP) && mode == IMPORTANCE {
+    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAP) && shading_normal_adjoint && mode == IMPORTANCE {
         return abs(dot(incoming, bsdf.facing_normal))
             * dot(outgoing, bsdf.frame.normal) / dot(outgoing, bsdf.facing_normal);
     }

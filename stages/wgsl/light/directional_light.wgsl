@@ -10,7 +10,7 @@ import package::surface::spawn::{Segment, spawn_origin};
 import package::trace::triangle::RAY_INFINITY;
 import package::light::table::{light_row, pick_probability};
 import package::light::light_sample::LightSample;
-import package::light::emission_sample::Emission;
+import package::light::light_vertex::{Emission, LightEnd, LightVertex};
 
 /// The disk of the light lies this many radii before the centre of the scene, so that rounding puts nothing behind it.
 const DISK_DISTANCE: real = 1.001;
@@ -27,13 +27,47 @@ fn sample_directional_light(light: u32, receiver: Surface) -> LightSample {
     return sample;
 }
 
-/// A ray of the beam: throughput = E / (p_pick p_disk).
-fn emit_directional_light(light: u32, random: vec2r) -> Emission {
+/// The light's direction.
+fn directional_light_vertex(light: u32) -> LightVertex {
+    var vertex: LightVertex;
+    vertex.light = light;
+    vertex.direction = vec3r(light_row(light, 2u).xyz);
+    vertex.throughput = vec3r(light_row(light, 3u).xyz) / pick_probability(light);
+    return vertex;
+}
+
+/// A ray of the beam.
+fn emit_directional_light(vertex: LightVertex, random: vec2r) -> Emission {
+    return emission_from_infinity(vertex.direction, random);
+}
+
+/// The light as a receiver sees it.
+fn directional_light_end(vertex: LightVertex, receiver: Surface) -> LightEnd {
+    return end_at_infinity(vertex.direction, receiver);
+}
+
+/// A ray along `direction` that starts on the disk before the scene.
+fn emission_from_infinity(direction: vec3r, random: vec2r) -> Emission {
     var emission: Emission;
-    emission.direction = vec3r(light_row(light, 2u).xyz);
-    emission.origin = origin_at_infinity(emission.direction, random);
-    emission.throughput = vec3r(light_row(light, 3u).xyz) / (pick_probability(light) * pdf_disk());
+    emission.direction = direction;
+    emission.origin = origin_at_infinity(direction, random);
+    emission.cosine = 1.0;
+    emission.pdf = pdf_disk();
+    emission.weight = vec3r(1.0 / emission.pdf);
+    emission.parallel = true;
     return emission;
+}
+
+/// A light at infinity that shines along `direction`, as a receiver sees it.
+fn end_at_infinity(direction: vec3r, receiver: Surface) -> LightEnd {
+    var end: LightEnd;
+    end.direction = -direction;
+    end.value = vec3r(1.0);
+    end.distance_squared = 1.0;
+    end.cosine = 1.0;
+    end.pdf = pdf_disk();
+    end.segment = segment_to_infinity(receiver, end.direction);
+    return end;
 }
 
 /// The ray from a surface out of the scene.

@@ -6,8 +6,8 @@ import package::math::elementary::{arc_tangent2, cosine, sine};
 import package::surface::surface::Surface;
 import package::light::table::pick_probability;
 import package::light::light_sample::LightSample;
-import package::light::emission_sample::Emission;
-import package::light::directional_light::{origin_at_infinity, pdf_disk, segment_to_infinity};
+import package::light::light_vertex::{Emission, LightEnd, LightVertex};
+import package::light::directional_light::{emission_from_infinity, end_at_infinity, segment_to_infinity};
 
 /// How the table lies in the world.
 struct SkyFrame {
@@ -122,13 +122,23 @@ fn sample_sky(light: u32, receiver: Surface, random: vec2r, texel: vec4r) -> Lig
     return sample;
 }
 
-/// A ray of light out of the sky: throughput = L / (p_env p_disk).
-fn emit_sky(light: u32, random: vec2r, direction: vec4r, texel: vec4r) -> Emission {
+/// A direction of the sky.
+fn sky_vertex(light: u32, random: vec2r, texel: vec4r) -> LightVertex {
     let drawn = sample_sky_direction(random, texel);
-    let density = pick_probability(light) * drawn.density * pdf_disk();
-    var emission: Emission;
-    emission.direction = -drawn.point.direction;
-    emission.origin = origin_at_infinity(emission.direction, direction.xy);
-    emission.throughput = sky_radiance_at(drawn.point.uv) * (drawn.point.sine_polar / density);
-    return emission;
+    var vertex: LightVertex;
+    vertex.light = light;
+    vertex.direction = -drawn.point.direction;
+    vertex.pdf = pick_probability(light) * drawn.density / drawn.point.sine_polar;
+    vertex.throughput = sky_radiance_at(drawn.point.uv) / vertex.pdf;
+    return vertex;
+}
+
+/// A ray of light out of the sky.
+fn emit_sky(vertex: LightVertex, random: vec2r) -> Emission {
+    return emission_from_infinity(vertex.direction, random);
+}
+
+/// The direction as a receiver sees it.
+fn sky_end(vertex: LightVertex, receiver: Surface) -> LightEnd {
+    return end_at_infinity(vertex.direction, receiver);
 }

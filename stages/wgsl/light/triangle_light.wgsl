@@ -2,7 +2,7 @@
 
 import package::real::{real, vec2r, vec3r, vec4r};
 import package::features::{HAS_ALPHA, HAS_TWO_SIDED_EMISSION};
-import package::math::constants::PI;
+import package::math::constants::{INVERSE_PI, PI};
 import package::math::frame::{frame_of, to_world};
 import package::sample::hemisphere::sample_cosine_hemisphere;
 import package::sample::triangle::sample_triangle;
@@ -11,10 +11,10 @@ import package::surface::surface::{Surface, surface_on};
 import package::trace::opacity::opacity_at;
 import package::trace::triangle::TRIANGLE_ALPHA_TESTED;
 import package::surface::material::{emission_at, is_emissive};
-import package::surface::spawn::{segment_between, spawn_origin};
+import package::surface::spawn::{SHORTEST_LENGTH, segment_between, spawn_origin};
 import package::light::table::{light_row, pick_probability};
 import package::light::light_sample::LightSample;
-import package::light::emission_sample::Emission;
+import package::light::light_vertex::{Emission, LightEnd, LightVertex};
 
 /// Density of the points of an emissive triangle in both kinds of sampling, per m2: pick probability / area.
 fn triangle_light_pdf_area(light: u32) -> real {
@@ -23,7 +23,7 @@ fn triangle_light_pdf_area(light: u32) -> real {
 
 /// A point of the light, uniform in area. The side it is seen from is still open.
 fn triangle_light_point(light: u32, random: vec2r) -> Surface {
-    return surface_on(bitcast<u32>(light_row(light, 0u).z), sample_triangle(random), vec3r(0.0));
+    return surface_on(triangle_of(light), sample_triangle(random), vec3r(0.0));
 }
 
 /// Mean radiance that rays which may pass through a partly transparent light see of it, W/(m2 sr).
@@ -44,7 +44,7 @@ fn sample_triangle_light(light: u32, receiver: Surface, random: vec2r) -> LightS
     point.front = dot(point.geometric_normal, span) < 0.0;
     let distance_squared = dot(span, span);
     var sample: LightSample;
-    sample.direction = span / max(sqrt(distance_squared), 1e-30);
+    sample.direction = span / max(sqrt(distance_squared), SHORTEST_LENGTH);
     sample.radiance = triangle_light_radiance(point);
     sample.density = triangle_light_pdf_area(light) * distance_squared;
     sample.cosine = abs(dot(point.geometric_normal, sample.direction));
@@ -52,27 +52,63 @@ fn sample_triangle_light(light: u32, receiver: Surface, random: vec2r) -> LightS
     return sample;
 }
 
-/// A ray of light that leaves the triangle with density cos/pi per sr, on either side with equal probability if both
-/// emit: throughput = Le cos / (p_area p_w).
-fn emit_triangle_light(light: u32, random: vec2r, direction: vec4r) -> Emission {
-    var point = triangle_light_point(light, random);
+/// A point of the light, uniform in area.
+fn triangle_light_vertex(light: u32, random: vec2r) -> LightVertex {
+    var vertex: LightVertex;
+    vertex.light = light;
+    vertex.place = sample_triangle(random);
+    vertex.pdf = triangle_light_pdf_area(light);
+    var point = surface_on(triangle_of(light), vertex.place, vec3r(0.0));
     point.front = true;
-    var sides = real(1.0);
-    var normal = point.geometric_normal;
-    if HAS_TWO_SIDED_EMISSION {
-        var back = point;
-        back.front = false;
-        if is_emissive(back) {
-            sides = 2.0;
-            if direction.z < 0.5 {
-                normal = -normal;
-                point.front = false;
-            }
-        }
-    }
+    vertex.throughput = triangle_light_radiance(point) / vertex.pdf;
+    return vertex;
+}
+
+/// A ray of light that leaves the triangle with density cos/pi per sr, on either side with equal probability if both emit.
+fn emit_triangle_light(vertex: LightVertex, random: vec4r) -> Emission {
+    let point = surface_on(triangle_of(vertex.light), vertex.place, vec3r(0.0));
+    let sides = emitting_sides(point);
+    let normal = select(point.geometric_normal, -point.geometric_normal, sides > 1.0 && random.z < 0.5);
     var emission: Emission;
-    emission.direction = to_world(frame_of(normal), sample_cosine_hemisphere(direction.xy));
+    emission.direction = to_world(frame_of(normal), sample_cosine_hemisphere(random.xy));
     emission.origin = spawn_origin(point, emission.direction);
-    emission.throughput = triangle_light_radiance(point) * (sides * PI / triangle_light_pdf_area(light));
+    emission.cosine = abs(dot(point.geometric_normal, emission.direction));
+    emission.pdf = emission_pdf_w(point, emission.cosine);
+    emission.weight = vec3r(sides * PI);
     return emission;
+}
+
+/// The point as a receiver sees it.
+fn triangle_light_end(vertex: LightVertex, receiver: Surface) -> LightEnd {
+    var point = surface_on(triangle_of(vertex.light), vertex.place, vec3r(0.0));
+    let span = point.position - receiver.position;
+    point.front = dot(point.geometric_normal, span) < 0.0;
+    var end: LightEnd;
+    end.distance_squared = dot(span, span);
+    end.direction = span / max(sqrt(end.distance_squared), SHORTEST_LENGTH);
+    end.cosine = abs(dot(point.geometric_normal, end.direction));
+    end.value = vec3r(select(0.0, end.cosine, is_emissive(point)));
+    end.pdf = emission_pdf_w(point, end.cosine);
+    end.segment = segment_between(receiver, point);
+    return end;
+}
+
+/// The triangle that a light is.
+fn triangle_of(light: u32) -> u32 {
+    return bitcast<u32>(light_row(light, 0u).z);
+}
+
+/// Sides of an emissive surface that emit: 1 or 2.
+fn emitting_sides(surface: Surface) -> real {
+    if HAS_TWO_SIDED_EMISSION {
+        var back = surface;
+        back.front = false;
+        return select(1.0, 2.0, is_emissive(back));
+    }
+    return 1.0;
+}
+
+/// Density, per sr, with which emission from a point of an emissive triangle takes a direction of this |cosine| on a side that emits.
+fn emission_pdf_w(surface: Surface, cosine: real) -> real {
+    return cosine * INVERSE_PI / emitting_sides(surface);
 }

@@ -11,6 +11,7 @@ import package::bsdf::bsdf::{RADIANCE, bsdf_at, eval_bsdf, is_connectable, sampl
 import package::light::light::emitter_pdf_w;
 import package::transport::direct::{direct_light, offer_direct_light};
 import package::transport::mis::{hit_weight, weighted_inverse_light_pdf};
+import package::transport::termination::survives;
 import package::transport::walk::{arrive, depart, is_absorbed};
 
 /// Vertex s = `path.length` of a path tracer's eye walk: adds emission it ran into (path of s edges), samples a light
@@ -39,8 +40,9 @@ fn shade_mis(walk: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
             offer_direct_light(walk, surface, light, scattered.value, weighted_inverse_light_pdf(light, scattered.pdf));
         }
     }
-    let sample = sample_bsdf(bsdf, outgoing, random4(WALK_EYE, path.length, DIMENSION_SCATTER).xyz, RADIANCE);
-    if is_absorbed(sample) {
+    let random = random4(WALK_EYE, path.length, DIMENSION_SCATTER);
+    var sample = sample_bsdf(bsdf, outgoing, random.xyz, RADIANCE);
+    if is_absorbed(sample) || !survives(walk, &sample, bsdf, path.length, random.w, RADIANCE) {
         return ABSORBED;
     }
     depart(walk, surface, sample);

@@ -10,6 +10,7 @@ import package::bsdf::bsdf::{RADIANCE, bsdf_at, eval_bsdf, is_connectable, sampl
 import package::transport::direct::{direct_light, offer_direct_light};
 import package::transport::mis::inverse_light_pdf;
 import package::transport::reference::counts_met_light;
+import package::transport::termination::survives;
 import package::transport::walk::{arrive, depart, is_absorbed};
 
 /// Vertex s = `path.length` of the reference's eye walk: adds emission nobody could have sampled (path of s edges),
@@ -34,13 +35,14 @@ fn shade_nee(walk: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
             offer_direct_light(walk, surface, light, scattered.value, inverse_light_pdf(light));
         }
     }
-    let sample = sample_bsdf(bsdf, outgoing, random4(WALK_EYE, path.length, DIMENSION_SCATTER).xyz, RADIANCE);
+    let random = random4(WALK_EYE, path.length, DIMENSION_SCATTER);
+    var sample = sample_bsdf(bsdf, outgoing, random.xyz, RADIANCE);
     var useful = path.length + 1u < max_edges;
     if HAS_DELTA {
         useful = useful || sample.delta;
-        walk.flags = select(0u, FLAGS_SPECULAR, sample.delta);
+        walk.flags = select(walk.flags & ~FLAGS_SPECULAR, walk.flags | FLAGS_SPECULAR, sample.delta);
     }
-    if !useful || is_absorbed(sample) {
+    if !useful || is_absorbed(sample) || !survives(walk, &sample, bsdf, path.length, random.w, RADIANCE) {
         return ABSORBED;
     }
     depart(walk, surface, sample);

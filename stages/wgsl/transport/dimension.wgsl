@@ -3,7 +3,7 @@
 //!
 //! | walk, vertex           | dimension            | x, y                          | z, w                        |
 //! |------------------------|----------------------|-------------------------------|-----------------------------|
-//! | any, surface           | DIMENSION_SCATTER    | direction                     | lobe, -                     |
+//! | any, surface           | DIMENSION_SCATTER    | direction                     | lobe, survival              |
 //! | eye, surface           | DIMENSION_LIGHT      | place on the light            | choice of the light         |
 //! | eye, surface           | DIMENSION_SKY        | row, column of the sky's texel | threshold, -               |
 //! | eye, camera            | DIMENSION_EMIT       | raster                        | lens                        |
@@ -18,6 +18,11 @@ import package::random::random4;
 
 const DIMENSION_SKY: u32 = 4u;
 const DIMENSION_DIRECTION: u32 = 5u;
+
+/// Key of vertex x_s of the eye walk that belongs to light vertex y_t; of the first one it is s, as in pipelines with one eye walk.
+fn eye_vertex(s: u32, t: u32) -> u32 {
+    return s | ((t - 1u) << 8u);
+}
 
 /// Further numbers for lights that are tables and need more than four; zero, and not drawn, in scenes without a table.
 fn random_extra(walk: u32, vertex: u32) -> vec4r {

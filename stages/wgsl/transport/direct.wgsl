@@ -5,7 +5,7 @@ import package::state::{Connection, Walk};
 import package::features::HAS_ATTENUATION;
 import package::pass::path_pixel;
 import package::random::{DIMENSION_LIGHT, WALK_EYE, random4};
-import package::streams::push_connection;
+import package::streams::{push_connection, push_particle};
 import package::surface::surface::Surface;
 import package::surface::spawn::Segment;
 import package::light::light::sample_light;
@@ -25,12 +25,23 @@ fn offer_direct_light(walk: ptr<function, Walk>, surface: Surface, light: LightS
     offer(walk, surface, light.segment, contribution, path_pixel());
 }
 
-/// Pushes a contribution that holds if `segment`, which starts at the walk's newest vertex `surface`, is free; absorbs
-/// along it. Black ones are not worth a ray.
+/// Pushes a contribution to the path's own pixel that holds if `segment`, which starts at the walk's newest vertex `surface`, is
+/// free; absorbs along it. Black ones are not worth a ray.
 fn offer(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) {
-    if all(contribution == vec3r(0.0)) {
-        return;
+    if any(contribution != vec3r(0.0)) {
+        push_connection(connection_of(walk, surface, segment, contribution, pixel));
     }
+}
+
+/// As `offer`, to a pixel that need not be the path's own.
+fn offer_particle(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) {
+    if any(contribution != vec3r(0.0)) {
+        push_particle(connection_of(walk, surface, segment, contribution, pixel));
+    }
+}
+
+/// The contribution that arrives if `segment` is free.
+fn connection_of(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) -> Connection {
     var connection: Connection;
     connection.origin = segment.origin;
     connection.direction = segment.direction;
@@ -42,5 +53,5 @@ fn offer(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribu
         let medium = medium_after(surface, walk.medium, transmitted == surface.front);
         connection.contribution *= transmittance(medium, segment.distance);
     }
-    push_connection(connection);
+    return connection;
 }

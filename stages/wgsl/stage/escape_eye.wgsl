@@ -1,0 +1,30 @@
+import package::real::{real, vec3r};
+import package::state::{Path, Walk};
+import package::outcome::ENDED;
+import package::features::HAS_SKY;
+import package::film::splat;
+import package::pass::path_pixel;
+import package::light::directional_light::pdf_disk;
+import package::light::sky::{sky_pdf_w, sky_radiance};
+import package::transport::advance::sums_of;
+import package::transport::recursive_mis::{join, scaled, weight_over};
+import package::transport::strategy::{implicit_counts, implicit_samples, is_used};
+
+/// Ends an eye walk in the sky: the implicit strategy for the light at infinity, weighted against sampling its direction.
+fn escape_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
+    if HAS_SKY {
+        let edges = path.eye_length + 1u;
+        if implicit_counts(edges, path.light_length) {
+            var rivals = real(0.0);
+            if edges > 1u {
+                let pdf_sky = sky_pdf_w(eye.direction);
+                let sums = sums_of(eye);
+                let sampled = select(0.0, pdf_sky, is_used(edges - 1u, 1u));
+                rivals = join(scaled(sampled, sums.a), scaled(pdf_sky * pdf_disk(), sums.b));
+            }
+            let weight = weight_over(implicit_samples(edges), rivals);
+            splat(path_pixel(), eye.throughput * sky_radiance(eye.direction) * weight);
+        }
+    }
+    return ENDED;
+}

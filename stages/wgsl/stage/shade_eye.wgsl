@@ -1,0 +1,66 @@
+import package::real::{real, vec3r};
+import package::state::{Path, Walk};
+import package::outcome::{ENDED, SCATTERED};
+import package::params::max_edges;
+import package::features::HAS_AREA_LIGHT;
+import package::film::splat;
+import package::pass::path_pixel;
+import package::random::{DIMENSION_SCATTER, WALK_EYE, random4};
+import package::surface::surface::{NO_LIGHT, Surface};
+import package::surface::material::{emission_at, is_emissive, material_at};
+import package::bsdf::bsdf::{RADIANCE, bsdf_at, is_connectable, sample_bsdf};
+import package::light::triangle_light::{emission_pdf_w, triangle_light_pdf_area};
+import package::transport::advance::{advance, meet, surface_cosine};
+import package::transport::connect::connect;
+import package::transport::dimension::eye_vertex;
+import package::transport::recursive_mis::{MisPartial, join, scaled, weight_over};
+import package::transport::strategy::{eye_joins, eye_limit, implicit_counts, implicit_samples, is_used};
+import package::transport::termination::survives;
+import package::transport::walk::{arrive, is_absorbed};
+
+/// Vertex x_s of the eye walk that belongs to light vertex y_t: adds emission that it met (path of s edges), joins x_s to y_t
+/// (s + t edges) and scatters.
+fn shade_eye(eye: ptr<function, Walk>, light: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
+    path.eye_length += 1u;
+    let s = path.eye_length;
+    let t = path.light_length;
+    let surface = arrive(eye);
+    let sums = meet(eye, surface, false);
+    if HAS_AREA_LIGHT {
+        if is_emissive(surface) && implicit_counts(s, t) {
+            add_met_emission(eye, surface, sums, s);
+        }
+    }
+    let goes_on = s < eye_limit(t);
+    let joins = s + t <= max_edges && is_used(s, t);
+    if !goes_on && !joins {
+        return ENDED;
+    }
+    let outgoing = -eye.direction;
+    let bsdf = bsdf_at(surface, material_at(surface), outgoing);
+    if joins && is_connectable(bsdf) {
+        connect(eye, light, surface, bsdf, sums, s, t);
+    }
+    if !goes_on {
+        return ENDED;
+    }
+    let random = random4(WALK_EYE, eye_vertex(s, t), DIMENSION_SCATTER);
+    var sample = sample_bsdf(bsdf, outgoing, random.xyz, RADIANCE);
+    if is_absorbed(sample) || !survives(eye, &sample, bsdf, s, random.w, RADIANCE) {
+        return ENDED;
+    }
+    advance(eye, surface, bsdf, sample, sums, eye_joins(s - 1u));
+    return SCATTERED;
+}
+
+/// Adds the emission of an emitter that the eye walk has run into: the implicit strategy, weighted against sampling the emitter.
+fn add_met_emission(eye: ptr<function, Walk>, surface: Surface, sums: MisPartial, s: u32) {
+    var rivals = real(0.0);
+    if s > 1u && surface.light != NO_LIGHT {
+        let pdf_area = triangle_light_pdf_area(surface.light);
+        let pdf_w = emission_pdf_w(surface, surface_cosine(surface, eye.direction));
+        let sampled = select(0.0, pdf_area, is_used(s - 1u, 1u));
+        rivals = join(scaled(sampled, sums.a), scaled(pdf_area * pdf_w, sums.b));
+    }
+    splat(path_pixel(), eye.throughput * emission_at(surface) * weight_over(implicit_samples(s), rivals));
+}

@@ -1,0 +1,18 @@
+import package::state::{Path, Walk};
+import package::outcome::EMITTED;
+import package::camera::camera::camera_pdf_w;
+import package::transport::advance::set_sums;
+import package::transport::dimension::eye_vertex;
+import package::transport::recursive_mis::{MisPartial, source};
+import package::transport::walk::begin_eye;
+
+/// Starts the eye walk that belongs to light vertex y_t, t = `path.light_length`, with random numbers of its own.
+fn start_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
+    path.eye_length = 0u;
+    let cosine = begin_eye(eye, eye_vertex(0u, path.light_length));
+    var sums: MisPartial;
+    // There is one light path a pixel: the particle strategy takes as many samples as the others.
+    sums.a = source(1.0 / camera_pdf_w(cosine));
+    set_sums(eye, sums);
+    return EMITTED;
+}

@@ -1,0 +1,46 @@
+//! Steps of a walk that carries sums for multiple importance sampling; eye and light walks share them.
+
+import package::real::{real, vec3r};
+import package::state::Walk;
+import package::surface::surface::Surface;
+import package::bsdf::bsdf::{Bsdf, BsdfSample, reverse_pdf_of_sample};
+import package::features::HAS_DELTA;
+import package::transport::walk::depart;
+import package::transport::recursive_mis::{MisPartial, arrived_sums, scattered_sums, specular_sums};
+
+/// The sums that the walk carries.
+fn sums_of(walk: ptr<function, Walk>) -> MisPartial {
+    return MisPartial(walk.mis_a, walk.mis_b, walk.mis_c);
+}
+
+/// Stores the sums in the walk.
+fn set_sums(walk: ptr<function, Walk>, sums: MisPartial) {
+    walk.mis_a = sums.a;
+    walk.mis_b = sums.b;
+    walk.mis_c = sums.c;
+}
+
+/// |cosine| of a direction at a surface, by the geometric normal: that of the measure in which the sums count.
+fn surface_cosine(surface: Surface, direction: vec3r) -> real {
+    return abs(dot(surface.geometric_normal, direction));
+}
+
+/// The sums after the walk's ray has met `surface`; `parallel`: it came from infinity.
+fn meet(walk: ptr<function, Walk>, surface: Surface, parallel: bool) -> MisPartial {
+    let distance = select(walk.hit.t, 1.0, parallel);
+    return arrived_sums(sums_of(walk), distance * distance, surface_cosine(surface, walk.direction));
+}
+
+/// Sends the walk on along a sampled direction. `sums` are those at the surface, `ended` as in `scattered_sums`.
+fn advance(walk: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sample: BsdfSample, sums: MisPartial, ended: real) {
+    let reverse_pdf = reverse_pdf_of_sample(bsdf, -walk.direction, sample);
+    let cosine = surface_cosine(surface, sample.direction);
+    var next: MisPartial;
+    if HAS_DELTA && sample.delta {
+        next = specular_sums(sums, sample.pdf, reverse_pdf, cosine);
+    } else {
+        next = scattered_sums(sums, sample.pdf, reverse_pdf, cosine, ended);
+    }
+    set_sums(walk, next);
+    depart(walk, surface, sample);
+}

@@ -1,0 +1,78 @@
+//! The strategies (s, t) of a bidirectional path: s vertices from the eye walk, t from the light walk, s + t edges.
+//! t = 0 implicit (the eye walk hits a light), t = 1 explicit, s = 0 particle (joined to the camera), else connection.
+
+import package::real::real;
+import package::params::{counting, counting_first, counting_measured, early_end, max_edges};
+import package::params::{only_edges, only_eye_vertices, use_connection, use_explicit, use_implicit, use_particle};
+import package::tallies::light_vertices_rate;
+
+/// Whether a strategy takes part. With `only_edges` the bits of `only_eye_vertices` say which s do.
+fn is_used(s: u32, t: u32) -> bool {
+    if only_edges > 0u && (s + t != only_edges || ((only_eye_vertices >> s) & 1u) == 0u) {
+        return false;
+    }
+    if t == 0u {
+        return use_implicit;
+    }
+    if s == 0u {
+        return use_particle && t > 1u;
+    }
+    return select(use_connection, use_explicit, t == 1u);
+}
+
+/// 1 or 0: whether the strategies that join x_s of an eye walk to light vertices beyond the next are used. With `only_edges` s decides.
+fn eye_joins(s: u32) -> real {
+    if only_edges > 0u {
+        return select(0.0, 1.0, s <= only_edges && is_used(s, only_edges - s));
+    }
+    return select(0.0, 1.0, select(use_connection, use_particle, s == 0u));
+}
+
+/// 1 or 0: whether the strategies that join y_t of a light walk to eye vertices are used.
+fn light_joins(t: u32) -> real {
+    if only_edges > 0u {
+        return select(0.0, 1.0, t <= only_edges && is_used(only_edges - t, t));
+    }
+    return select(0.0, 1.0, select(use_connection, use_explicit, t == 1u));
+}
+
+/// Vertices of the eye walk that belongs to light vertex `t` at most; its last ray only looks for light. 0: there is no such walk.
+fn eye_limit(t: u32) -> u32 {
+    if t == 1u {
+        return max_edges;
+    }
+    if early_end || counting == counting_first {
+        return max_edges - t;
+    }
+    return max_edges - t + 1u;
+}
+
+/// Whether light that the walk to x_s belonging to light vertex `t` meets counts.
+fn implicit_counts(s: u32, t: u32) -> bool {
+    return (counting != counting_first || t == 1u) && is_used(s, 0u);
+}
+
+/// Samples of the implicit strategy of `edges` edges for each light path: the eye walks that may reach so far. Measured: their
+/// expected number; realised: the largest possible, a constant that the picture is corrected for at the end.
+fn implicit_samples(edges: u32) -> real {
+    if counting == counting_first {
+        return 1.0;
+    }
+    var samples = real(1.0);
+    for (var t = 2u; t <= max_edges && eye_limit(t) >= edges; t += 1u) {
+        if counting == counting_measured {
+            samples += real(light_vertices_rate(t));
+        } else {
+            samples += 1.0;
+        }
+    }
+    return samples;
+}
+
+/// `implicit_samples`, or 0 where that strategy is left out.
+fn implicit_term(edges: u32) -> real {
+    if !is_used(edges, 0u) {
+        return 0.0;
+    }
+    return implicit_samples(edges);
+}
