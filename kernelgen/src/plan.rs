@@ -17,6 +17,9 @@ pub struct Plan {
     pub program: Vec<Step>,
     /// Words of the control buffer that the host reads after a pass; all are zeroed by the program's first step and count one pass.
     pub counters: Vec<Counter>,
+    /// Tallies, where kernels use one: each has its own part of the buffers of `Role::TallyCounts` and `Role::TallyRates`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tallies: Vec<Tally>,
     /// How film words are to be read.
     pub film: Accumulate,
     /// Bytes of state a path slot takes, all tables.
@@ -34,6 +37,17 @@ pub struct Needs {
     pub int64_atomics: bool,
     /// `atomic<f32>`.
     pub float32_atomics: bool,
+}
+
+/// A tally's part of the counts and rates.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Tally {
+    /// Its name.
+    pub name: String,
+    /// Its first word.
+    pub first: u32,
+    /// How many words it has.
+    pub size: u32,
 }
 
 /// A buffer.
@@ -63,6 +77,10 @@ pub enum Role {
     Stream,
     /// The film: three channels a pixel, interleaved, one f32 or i64 each. The runtime zeroes it at the start and reads it.
     Film,
+    /// What stages count, a u32 an index of a tally. The runtime zeroes it at the start, reads it and zeroes it when it likes.
+    TallyCounts,
+    /// Counts of earlier samples for each path, an f32 an index of a tally; written by the runtime.
+    TallyRates,
     /// Uniform, 32 bytes, written by the runtime before each pass: u32 first_pixel, first_sample, active, width, height, seed, 0, 0.
     /// Slot i works on linear = first_pixel + i; sample = first_sample + linear / (width*height); pixel = tile order of linear % (width*height).
     Pass,

@@ -110,7 +110,10 @@ fn allocate(gpu: &Gpu, buffer: &Buffer, size: u64) -> Result<wgpu::Buffer, Error
     let usage = match buffer.role {
         Role::Pass => BufferUsages::UNIFORM | BufferUsages::COPY_DST,
         Role::Arguments => BufferUsages::STORAGE | BufferUsages::INDIRECT,
-        Role::Control | Role::Film => BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+        Role::Control | Role::Film | Role::TallyCounts => {
+            BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST
+        }
+        Role::TallyRates => BufferUsages::STORAGE | BufferUsages::COPY_DST,
         Role::State | Role::Queue | Role::Stream | Role::Resource => BufferUsages::STORAGE,
     };
     let size = if buffer.role == Role::Pass { size.max(crate::execute::PASS_BYTES) } else { size };

@@ -4,6 +4,7 @@
 use crate::buffers::create;
 use crate::device::Gpu;
 use crate::error::Error;
+use crate::tallies::Tallied;
 use bytemuck::{Pod, Zeroable};
 use kernelgen::config::model::Accumulate;
 use wgpu::BufferUsages;
@@ -24,6 +25,8 @@ pub struct Totals {
     pub sums: Sums,
     /// For every sum: the sum over batches of n_b (m_b - m)^2, where n_b and m_b are a batch's samples and mean; `None` when unknown.
     pub spread: Option<Vec<f32>>,
+    /// What the paths counted, where stages count.
+    pub tallied: Option<Tallied>,
 }
 
 /// Sums of radiance over all samples.
@@ -85,6 +88,7 @@ struct BatchUniform {
 pub struct Accumulator {
     kind: Accumulate,
     words: u32,
+    film: wgpu::Buffer,
     uniform: wgpu::Buffer,
     sums: wgpu::Buffer,
     spread: wgpu::Buffer,
@@ -133,7 +137,14 @@ impl Accumulator {
                 entries: &entries,
             })
         })?;
-        Ok(Self { kind, words, uniform, sums, spread, pipeline, bindings })
+        Ok(Self { kind, words, film: film.clone(), uniform, sums, spread, pipeline, bindings })
+    }
+
+    /// Forgets what the film holds of a batch that has not ended.
+    pub fn clear_film(&self, gpu: &Gpu) {
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("clear") });
+        encoder.clear_buffer(&self.film, 0, None);
+        gpu.queue.submit([encoder.finish()]);
     }
 
     /// Encodes the end of a batch of `samples` samples per pixel that follows `before` others: the film is added to the sums and zeroed.
@@ -163,7 +174,7 @@ impl Accumulator {
             Sums::Float(pairs.map(|[high, low]| f64::from(high) + f64::from(low)).collect())
         };
         let spread = spread.chunks_exact(4).take(words).map(bytemuck::pod_read_unaligned).collect();
-        Ok(Totals { samples, batches, sums, spread: Some(spread) })
+        Ok(Totals { samples, batches, sums, spread: Some(spread), tallied: None })
     }
 
     /// Continues from earlier sums, rounding them to this film's kind where the kinds differ.

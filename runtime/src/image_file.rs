@@ -100,7 +100,7 @@ impl Image {
             // One batch does not deviate from itself.
             None => (batches <= 1).then(|| vec![0.0; self.radiance.len()]),
         };
-        Totals { samples, batches, sums, spread }
+        Totals { samples, batches, sums, spread, tallied: None }
     }
 }
 
@@ -182,7 +182,8 @@ mod tests {
 
     #[test]
     fn standard_errors_survive_totals() {
-        let totals = Totals { samples: 64, batches: 8, sums: Sums::Float(vec![6.4; 3]), spread: Some(vec![2.0; 3]) };
+        let (sums, spread) = (Sums::Float(vec![6.4; 3]), Some(vec![2.0; 3]));
+        let totals = Totals { samples: 64, batches: 8, sums, spread, tallied: None };
         let image = Image {
             size: [1, 1],
             radiance: totals.mean(),

@@ -13,3 +13,4 @@ pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod settings;
+pub mod tallies;

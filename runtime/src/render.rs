@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::execute::{Counters, Executor, IN_FLIGHT, Pass};
 use crate::film::{Accumulator, Totals};
 use crate::profile::Profile;
+use crate::tallies::{PILOT_SEED, PILOT_SLOTS, Tallies};
 use kernelgen::plan::{Plan, Role};
 use std::time::Instant;
 
@@ -81,6 +82,9 @@ pub struct Session {
     gpu: Gpu,
     executor: Executor,
     accumulator: Accumulator,
+    tallies: Option<Tallies>,
+    /// Whether the pilot is still to come.
+    unpiloted: bool,
     settings: Settings,
     path_count: u32,
     pass_limit: u32,
@@ -115,11 +119,14 @@ impl Session {
         let buffers = Buffers::new(gpu, plan, pixels.into(), path_count, resources)?;
         let accumulator = Accumulator::new(gpu, plan.film, pixels.into(), buffers.of(plan, Role::Film)?)?;
         let executor = Executor::new(gpu, plan, &buffers)?;
+        let tallies = Tallies::new(plan, &buffers);
         gpu.check()?;
         Ok(Self {
             gpu: gpu.clone(),
             executor,
             accumulator,
+            unpiloted: tallies.as_ref().is_some_and(Tallies::have_rates),
+            tallies,
             settings,
             path_count,
             pass_limit: path_count,
@@ -144,8 +151,11 @@ impl Session {
     /// Continues an earlier render: its samples are neither lost nor taken again. Call before `run`.
     ///
     /// # Errors
-    /// User input, when its size differs.
+    /// User input, when its size differs, or its paths counted something else.
     pub fn resume(&mut self, totals: &Totals) -> Result<(), Error> {
+        if let Some(tallies) = &mut self.tallies {
+            tallies.resume(totals.tallied.as_ref())?;
+        }
         self.accumulator.write(&self.gpu, totals)?;
         self.samples = totals.samples;
         self.samples_before = totals.samples;
@@ -160,6 +170,7 @@ impl Session {
     /// Failed, when the device is lost, a stream overflowed or paths were left unfinished.
     pub fn run(&mut self, until: Until, watch: &mut dyn FnMut(&Progress) -> bool) -> Result<(), Error> {
         let start = Instant::now();
+        self.pilot()?;
         self.finished = None;
         let before = self.seconds;
         let mut stop = false;
@@ -174,15 +185,65 @@ impl Session {
                 && self.batches >= FEWEST_BATCHES
                 && looked.elapsed().as_secs_f64() > ERROR_SECONDS
             {
+                self.drain_tallies()?;
                 stop |= self.totals()?.relative_error() <= wanted;
                 looked = Instant::now();
             }
         }
+        self.drain_tallies()?;
+        self.finish_passes()?;
+        self.seconds = before + start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Runs the program once for the rates that the first sample reads. Nothing else of it remains: neither light nor counts of rays.
+    fn pilot(&mut self) -> Result<(), Error> {
+        let Some(tallies) = self.tallies.as_mut().filter(|_| std::mem::take(&mut self.unpiloted)) else {
+            return Ok(());
+        };
+        tallies.begin_pilot(&self.gpu);
+        let seed = self.settings.seed ^ PILOT_SEED;
+        let mut done = 0;
+        while done < PILOT_SLOTS {
+            let active = self.pass_limit.min(PILOT_SLOTS - done);
+            let pass = pass_at(&self.settings, seed, 0, done.into(), active);
+            self.executor.submit(pass, false, |_| ())?;
+            self.executor.wait()?;
+            done += active;
+        }
+        tallies.end_pilot(&self.gpu)?;
+        self.accumulator.clear_film(&self.gpu);
+        Ok(())
+    }
+
+    fn finish_passes(&mut self) -> Result<(), Error> {
         while self.executor.in_flight() > 0 {
             self.finish_pass()?;
         }
-        self.seconds = before + start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Takes over what was counted on the device.
+    fn drain_tallies(&mut self) -> Result<(), Error> {
+        if self.tallies.is_some() {
+            self.finish_passes()?;
+            // The next pass finds an idle device: the time until it is done says less about it.
+            self.finished = None;
+        }
+        self.tallies.as_mut().map_or(Ok(()), |tallies| tallies.drain(&self.gpu))
+    }
+
+    /// Rates come from all samples so far whenever these are a power of two for each pixel.
+    fn renew_rates(&mut self) -> Result<(), Error> {
+        if !self.samples.is_power_of_two() || !self.has_rates() {
+            return Ok(());
+        }
+        self.drain_tallies()?;
+        self.tallies.as_mut().map_or(Ok(()), |tallies| tallies.renew_rates(&self.gpu))
+    }
+
+    fn has_rates(&self) -> bool {
+        self.tallies.as_ref().is_some_and(Tallies::have_rates)
     }
 
     fn reached(&self, until: Until, elapsed: f64) -> bool {
@@ -200,8 +261,15 @@ impl Session {
         if done > 0.0 { elapsed * flying / done } else { 0.0 }
     }
 
-    /// Samples per pixel of the next batch: a pass of whole samples at most, and an eighth of the work at most.
+    /// Samples per pixel of the next batch: it ends where the rates of tallies change.
     fn batch_samples(&self, until: Until) -> u32 {
+        let wanted = self.wanted_samples(until);
+        let milestone = self.samples.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
+        if self.has_rates() { wanted.min(milestone - self.samples) } else { wanted }
+    }
+
+    /// A pass of whole samples at most, and an eighth of the work at most.
+    fn wanted_samples(&self, until: Until) -> u32 {
         let pixels = self.settings.size[0] * self.settings.size[1];
         let natural = (self.path_count / pixels).max(1);
         match until {
@@ -223,28 +291,21 @@ impl Session {
                 after_pass(self, start.elapsed().as_secs_f64());
             }
             let active = u64::from(self.pass_limit).min(work - done) as u32;
+            if self.tallies.as_ref().is_some_and(|tallies| tallies.are_full(active)) {
+                self.drain_tallies()?;
+            }
             let last = done + u64::from(active) == work;
             self.submit(done, active, last.then_some(samples))?;
             done += u64::from(active);
         }
         self.samples += samples;
         self.batches += 1;
-        Ok(())
+        self.renew_rates()
     }
 
     /// Submits the pass that begins `done` slots into the current batch, and ends the batch behind it if `ends` says of how many samples.
     fn submit(&mut self, done: u64, active: u32, ends: Option<u32>) -> Result<(), Error> {
-        let [width, height] = self.settings.size;
-        let pixels = u64::from(width) * u64::from(height);
-        let pass = Pass {
-            first_pixel: (done % pixels) as u32,
-            first_sample: self.samples + (done / pixels) as u32,
-            active,
-            width,
-            height,
-            seed: self.settings.seed,
-            unused: [0; 2],
-        };
+        let pass = pass_at(&self.settings, self.settings.seed, self.samples, done, active);
         let number = self.passes;
         let measure = number <= MEASURED_FIRST || number.is_multiple_of(MEASURED_EVERY);
         let (gpu, accumulator, samples) = (&self.gpu, &self.accumulator, self.samples);
@@ -255,6 +316,9 @@ impl Session {
         })?;
         self.passes += 1;
         self.sizes.push_back(active);
+        if let Some(tallies) = &mut self.tallies {
+            tallies.submitted(active);
+        }
         Ok(())
     }
 
@@ -308,7 +372,18 @@ impl Session {
         if !self.spread_known {
             totals.spread = None;
         }
+        totals.tallied = self.tallies.as_ref().map(|tallies| tallies.tallied().clone());
         Ok(totals)
+    }
+
+    /// What stages counted at every index, tally by tally as in the plan, by earlier runs too; empty for a plan without tallies.
+    pub fn tally_totals(&self) -> Vec<u64> {
+        self.tallies.as_ref().map(|tallies| tallies.tallied().counts.clone()).unwrap_or_default()
+    }
+
+    /// Paths behind `tally_totals`.
+    pub fn tally_slots(&self) -> u64 {
+        self.tallies.as_ref().map_or(0, |tallies| tallies.tallied().slots)
     }
 
     /// Reads the picture; more may be rendered afterwards.
@@ -344,6 +419,21 @@ pub fn render(
     let mut session = Session::new(gpu, plan, resources, settings, Some(samples))?;
     session.run(Until::Samples(samples), &mut |_| true)?;
     session.picture()
+}
+
+/// The pass of `active` slots that begins `done` slots behind the start of sample `sample`.
+fn pass_at(settings: &Settings, seed: u32, sample: u32, done: u64, active: u32) -> Pass {
+    let [width, height] = settings.size;
+    let pixels = u64::from(width) * u64::from(height);
+    Pass {
+        first_pixel: (done % pixels) as u32,
+        first_sample: sample + (done / pixels) as u32,
+        active,
+        width,
+        height,
+        seed,
+        unused: [0; 2],
+    }
 }
 
 fn pixels_of(size: [u32; 2]) -> Result<u32, Error> {

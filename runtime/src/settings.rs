@@ -3,6 +3,7 @@
 use crate::configs::{Axis, Library};
 use crate::error::Error;
 use crate::scene::BuildPreset;
+use crate::tallies::Tallied;
 use indexmap::IndexMap;
 use kernelgen::config::model::{Effects, Selection};
 use serde::{Deserialize, Serialize};
@@ -127,13 +128,16 @@ impl SetValue {
 }
 
 /// How far a saved picture is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct State {
     /// Samples per pixel in it.
     pub samples: u32,
     /// Batches they came in.
     pub batches: u32,
+    /// What its paths counted, where stages count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tallies: Option<Tallied>,
 }
 
 impl RenderFile {
@@ -297,9 +301,10 @@ mod tests {
 
     #[test]
     fn metadata_can_be_read_back() {
+        let tallies = Tallied { counts: vec![3, 1 << 40], slots: 1 << 50, rated_counts: vec![2, 1], rated_slots: 7 };
         let settings = RenderFile {
             spp: Some(16),
-            state: Some(State { samples: 16, batches: 8 }),
+            state: Some(State { samples: 16, batches: 8, tallies: Some(tallies) }),
             files: IndexMap::from([("pipelines/mine.toml".to_owned(), "start = \"a\"\n".to_owned())]),
             set: IndexMap::from([("schedule.workgroup".to_owned(), SetValue::Text("128".to_owned()))]),
             ..RenderFile::default()

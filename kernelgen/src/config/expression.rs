@@ -1,4 +1,4 @@
-//! `rounds`: integer arithmetic over parameters.
+//! `rounds` and sizes: integer arithmetic over parameters.
 
 use super::model::{Param, ParamValue, Pipeline};
 use super::suggest;
@@ -11,31 +11,41 @@ use indexmap::IndexMap;
 /// # Errors
 /// K0116 with the place inside the expression: syntax, an unknown or unfit parameter, a result outside of 1 to 2^32-1.
 pub fn evaluate_rounds(pipeline: &Pipeline) -> Result<u32, Diagnostic> {
-    let text = &pipeline.rounds;
-    let mut reader = Reader { text, rest: &text.value, params: &pipeline.params, used: Vec::new(), depth: 0 };
+    evaluate("rounds", &pipeline.rounds, &pipeline.params, u32::MAX)
+}
+
+/// Evaluates the `size` of something that the pipeline declares, written as `rounds`.
+///
+/// # Errors
+/// K0116, as `evaluate_rounds`; the result is 1 to 2^17.
+pub fn evaluate_size(pipeline: &Pipeline, size: &Spanned<String>) -> Result<u32, Diagnostic> {
+    evaluate("size", size, &pipeline.params, MAX_SIZE)
+}
+
+/// A larger size is a mistake: there are indices for every pair of ends of the longest paths.
+const MAX_SIZE: u32 = 1 << 17;
+
+fn evaluate(
+    key: &'static str,
+    text: &Spanned<String>,
+    params: &IndexMap<String, Param>,
+    most: u32,
+) -> Result<u32, Diagnostic> {
+    let mut reader = Reader { key, text, rest: &text.value, params, used: Vec::new(), depth: 0 };
     let value = reader.sum()?;
     if reader.peek().is_some() {
         return Err(reader.error("an operator or the end is missing here"));
     }
-    let rounds = u32::try_from(value).ok().filter(|rounds| *rounds > 0);
-    rounds.ok_or_else(|| outside(text.span, value, &reader.used))
-}
-
-fn outside(span: Span, value: i64, used: &[(Span, String)]) -> Diagnostic {
-    let mut diagnostic =
-        Diagnostic::error("K0116", format!("`rounds` comes to {value}")).at(span, format!("this is {value}"));
-    for (span, what) in used {
-        diagnostic = diagnostic.also(*span, what);
-    }
-    diagnostic.help(format!("it must come to 1 to {}", u32::MAX))
+    let fitting = u32::try_from(value).ok().filter(|value| (1..=most).contains(value));
+    fitting.ok_or_else(|| reader.outside(value, most))
 }
 
 /// Nesting beyond this is no round count but an attack on the stack.
 const MAX_DEPTH: u32 = 64;
 
-const GRAMMAR: &str = "`rounds` is built of integers, u32 parameters, `+ - * /` and parentheses";
-
 struct Reader<'a> {
+    /// What the expression is the value of.
+    key: &'static str,
     text: &'a Spanned<String>,
     rest: &'a str,
     params: &'a IndexMap<String, Param>,
@@ -45,6 +55,19 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
+    fn outside(&self, value: i64, most: u32) -> Diagnostic {
+        let message = format!("`{}` comes to {value}", self.key);
+        let mut diagnostic = Diagnostic::error("K0116", message).at(self.text.span, format!("this is {value}"));
+        for (span, what) in &self.used {
+            diagnostic = diagnostic.also(*span, what);
+        }
+        diagnostic.help(format!("it must come to 1 to {most}"))
+    }
+
+    fn grammar(&self) -> String {
+        format!("`{}` is built of integers, u32 parameters, `+ - * /` and parentheses", self.key)
+    }
+
     fn sum(&mut self) -> Result<i64, Diagnostic> {
         let mut value = self.product()?;
         while let Some(sign @ ('+' | '-')) = self.peek() {
@@ -97,7 +120,8 @@ impl<'a> Reader<'a> {
 
     fn number(&mut self) -> Result<i64, Diagnostic> {
         let digits = self.word(|c| c.is_ascii_digit());
-        let value = digits.parse::<u32>().map_err(|_| self.error_at(digits, "too large a number").help(GRAMMAR))?;
+        let value =
+            digits.parse::<u32>().map_err(|_| self.error_at(digits, "too large a number").help(self.grammar()))?;
         Ok(i64::from(value))
     }
 
@@ -110,7 +134,7 @@ impl<'a> Reader<'a> {
             }
             Some(param) => {
                 let unfit = self.error_at(name, "not a whole number").also(param.span, "its type is not u32");
-                Err(unfit.help("`rounds` is built of integers and u32 parameters"))
+                Err(unfit.help(format!("`{}` is built of integers and u32 parameters", self.key)))
             }
             None => {
                 let whole = |(name, param): (&'a String, &Param)| {
@@ -142,13 +166,13 @@ impl<'a> Reader<'a> {
     /// An error at the next character.
     fn error(&self, label: &str) -> Diagnostic {
         let length = self.rest.chars().next().map_or(0, char::len_utf8);
-        self.error_at(&self.rest[..length], label).help(GRAMMAR)
+        self.error_at(&self.rest[..length], label).help(self.grammar())
     }
 
     /// An error at a part of the text.
     fn error_at(&self, part: &str, label: &str) -> Diagnostic {
         let offset = part.as_ptr() as usize - self.text.value.as_ptr() as usize;
-        Diagnostic::error("K0116", format!("`rounds = \"{}\"` cannot be evaluated", self.text.value))
+        Diagnostic::error("K0116", format!("`{} = \"{}\"` cannot be evaluated", self.key, self.text.value))
             .at(self.span(offset, part.len()), label)
     }
 

@@ -21,5 +21,5 @@ mod wiring;
 mod tests;
 
 pub use axis::load;
-pub use expression::evaluate_rounds;
+pub use expression::{evaluate_rounds, evaluate_size};
 pub use suggest::nearest;

@@ -69,6 +69,8 @@ pub struct Pipeline {
     pub state: IndexMap<String, Spanned<String>>,
     /// Streams by name.
     pub streams: IndexMap<String, Stream>,
+    /// Tallies by name.
+    pub tallies: IndexMap<String, Tally>,
     /// Stages by name, in the order in which a round runs them.
     pub stages: IndexMap<String, Stage>,
 }
@@ -131,6 +133,17 @@ pub struct Stream {
     pub consumer: Spanned<String>,
     /// What its consumer's rays are counted as.
     pub rays: Option<RayKind>,
+}
+
+/// A tally: counters that stages increment, and whose rates among earlier samples they read.
+#[derive(Clone, Debug)]
+pub struct Tally {
+    /// Where its table stands.
+    pub span: Span,
+    /// How many counters: an expression as `rounds`.
+    pub size: Spanned<String>,
+    /// What it counts.
+    pub doc: String,
 }
 
 /// A stage: a WGSL function and where each of its outcomes leads.

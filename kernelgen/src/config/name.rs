@@ -6,7 +6,7 @@ use crate::source::Span;
 use naga::keywords::wgsl::{BUILTIN_IDENTIFIERS, RESERVED};
 
 /// Names that the generated modules declare themselves.
-const GENERATED: [&str; 14] = [
+const GENERATED: [&str; 16] = [
     "Hit",
     "Pass",
     "END",
@@ -21,6 +21,8 @@ const GENERATED: [&str; 14] = [
     "pass_seed",
     "path_count",
     "splat",
+    "tally_counts",
+    "tally_rates",
 ];
 
 /// K0114 when the key cannot name a declaration of the generated WGSL.

@@ -1,7 +1,7 @@
-//! The pipeline axis: records, instances, streams, stages.
+//! The pipeline axis: records, instances, streams, tallies, stages.
 
 use super::merge::AxisFile;
-use super::model::{Field, Pipeline, RayKind, Record, Stage, Stream};
+use super::model::{Field, Pipeline, RayKind, Record, Stage, Stream, Tally};
 use super::quantity::Quantity;
 use super::section::{Findings, Item, Section};
 use super::{name, param, suggest};
@@ -23,6 +23,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Pipe
         records: records(top, findings),
         state: state(top, findings),
         streams: streams(top, findings),
+        tallies: tallies(top, findings),
         stages: stages(top, findings),
     }
 }
@@ -165,6 +166,25 @@ fn streams(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Strea
         streams.insert(item.name.to_owned(), stream);
     }
     streams
+}
+
+fn tallies(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Tally> {
+    let mut tallies = IndexMap::new();
+    for item in top.entries("tallies", findings) {
+        name::check("tally", &item, findings);
+        let Some(section) = item.section(findings) else { continue };
+        section.allow(&["size", "doc"], findings);
+        let size = required_text(&section, "size", SIZE_HELP, findings);
+        tallies.insert(item.name.to_owned(), Tally { span: item.key, size, doc: doc(&section, findings) });
+    }
+    tallies
+}
+
+const SIZE_HELP: &str = "say how many indices there are: `size = \"max_edges + 1\"`";
+
+fn doc(section: &Section<'_>, findings: &mut Findings) -> String {
+    let text = section.get("doc").and_then(|doc| doc.text(findings));
+    text.map(|doc| doc.value).unwrap_or_default()
 }
 
 fn stages(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Stage> {

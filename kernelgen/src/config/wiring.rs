@@ -1,7 +1,7 @@
 //! Do the parts of a variant fit? Every name that one part says must exist in the other.
 
 use super::expression;
-use super::model::{Field, Layout, Pipeline, Placed, PlacedField, Variant};
+use super::model::{Field, Layout, Pipeline, Placed, PlacedField, Tally, Variant};
 use super::section::Findings;
 use super::suggest;
 use crate::diagnostic::Diagnostic;
@@ -18,6 +18,8 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
     check_names(pipeline, findings);
     check_stages(pipeline, findings);
     check_rounds(pipeline, findings);
+    check_sizes(pipeline, findings);
+    check_generated(pipeline, findings);
     for stream in &variant.schedule.batch {
         check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
     }
@@ -71,6 +73,41 @@ fn check_rounds(pipeline: &Pipeline, findings: &mut Findings) {
     if let Err(diagnostic) = expression::evaluate_rounds(pipeline) {
         findings.push(diagnostic);
     }
+}
+
+fn check_sizes(pipeline: &Pipeline, findings: &mut Findings) {
+    for size in pipeline.tallies.values().map(|tally| &tally.size).filter(|size| !is_missing(size)) {
+        findings.extend(expression::evaluate_size(pipeline, size).err());
+    }
+}
+
+/// Functions of the generated modules must not be declared twice, nor be named as a parameter or a record.
+fn check_generated(pipeline: &Pipeline, findings: &mut Findings) {
+    let params = pipeline.params.iter().map(|(name, param)| (name.clone(), param.span));
+    let records = pipeline.records.iter().map(|(name, record)| (name.clone(), record.span));
+    let mut taken: IndexMap<String, Span> = params.chain(records).collect();
+    for (name, span) in pipeline.tallies.iter().flat_map(|(name, tally)| tally_functions(name, tally)) {
+        if let Some(first) = taken.get(&name) {
+            let twice = Diagnostic::error("K0115", format!("`{name}` would be declared twice"))
+                .at(span, format!("declares `{name}`"))
+                .also(*first, "first declared here")
+                .help("give one of them another name");
+            findings.push(twice);
+        } else if name == COUNT_RAY {
+            let own = Diagnostic::error("K0115", format!("`{name}` would be declared twice"))
+                .at(span, format!("declares `{name}`, which counts rays in every pipeline"))
+                .help("give the tally another name");
+            findings.push(own);
+        }
+        taken.insert(name, span);
+    }
+}
+
+/// A function of the generated module `control`.
+const COUNT_RAY: &str = "count_ray";
+
+fn tally_functions(name: &str, tally: &Tally) -> [(String, Span); 2] {
+    [(format!("count_{name}"), tally.span), (format!("{name}_rate"), tally.span)]
 }
 
 /// Layout tables name instances.

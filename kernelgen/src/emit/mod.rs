@@ -9,6 +9,7 @@ mod program;
 mod queue;
 mod signature;
 mod stream;
+mod tally;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -21,7 +22,7 @@ use crate::config::model::{Selection, Variant};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::layout::{self, Placement, StateLeaf};
 use crate::link::Modules;
-use crate::plan::Plan;
+use crate::plan::{Plan, Tally};
 use crate::report::{self, Report};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexSet;
@@ -51,9 +52,10 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     let (variant, mut warnings) = config::load(sources, selection)?;
     check_names(&variant)?;
     let rounds = evaluate_rounds(&variant.pipeline).map_err(|finding| vec![finding])?;
+    let tallies = tally::tallies(&variant.pipeline).map_err(|finding| vec![finding])?;
     let constants = modules::constants(&variant.pipeline, &variant.effects);
     let mut modules = modules_of(sources);
-    let outcomes = add_config_modules(sources, &mut modules, &variant)?;
+    let outcomes = add_config_modules(sources, &mut modules, &variant, &tallies)?;
     let wiring = {
         let texts = Texts { sources, modules: &modules, constants: &constants, outcomes: &outcomes };
         wiring::wire(texts, &variant)?
@@ -75,6 +77,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
         queues: &queues,
         constants: &constants,
         rounds,
+        tallies: &tallies,
     };
     let built = program::build(sources, &mut modules, &program)?;
     let facts = wiring.stages.iter().map(|(name, stage)| (name.as_str(), &stage.facts));
@@ -109,6 +112,7 @@ fn add_config_modules(
     sources: &mut Sources,
     modules: &mut Modules,
     variant: &Variant,
+    tallies: &[Tally],
 ) -> Result<IndexSet<String>, Vec<Diagnostic>> {
     let pipeline = &variant.pipeline;
     let outcomes = modules::outcome_names(pipeline, &imported_outcomes(sources, modules, variant));
@@ -125,6 +129,7 @@ fn add_config_modules(
         ("control", queue::control_module(&queues)),
         ("film", film::module(variant.schedule.accumulate)),
         ("streams", stream::analysis_module(pipeline)),
+        ("tallies", tally::module(pipeline, tallies)),
     ];
     for (name, text) in texts {
         add_module(sources, modules, name, text);

@@ -4,13 +4,14 @@ use super::kernel::{self, Source};
 use super::memory::{self, Access};
 use super::queue::{self, Prepared, Queues};
 use super::stream;
+use super::tally;
 use super::wiring::Wiring;
 use crate::analyze::{self, Leaf, Liveness};
 use crate::config::model::{Accumulate, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
 use crate::layout::{Placement, StateLeaf};
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
-use crate::plan::{Binding, Buffer, Counter, Kernel, Needs, Plan, Role, Size, Step};
+use crate::plan::{Binding, Buffer, Counter, Kernel, Needs, Plan, Role, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexMap;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +26,7 @@ pub(super) struct Program<'a> {
     pub queues: &'a Queues,
     pub constants: &'a Constants,
     pub rounds: u32,
+    pub tallies: &'a [Tally],
 }
 
 /// A plan and the effects that its kernels ask for.
@@ -241,6 +243,7 @@ impl Builder<'_> {
     fn finish(self, program: Vec<Step>) -> Built {
         let buffers = self.buffers();
         let needs = self.needs();
+        let tallies = self.tallies(&buffers);
         let placement = self.program.placement;
         let kernels = self.kernels.into_iter().map(|(kernel, bindings)| {
             let binding = |binding: LinkedBinding| {
@@ -254,6 +257,7 @@ impl Builder<'_> {
             kernels: kernels.collect(),
             program,
             counters: counters.collect(),
+            tallies,
             film: self.program.variant.schedule.accumulate,
             bytes_per_path: placement.bytes_per_path(),
             needs,
@@ -280,6 +284,12 @@ impl Builder<'_> {
         buffers
     }
 
+    /// The tallies, if a kernel counts or reads one.
+    fn tallies(&self, buffers: &IndexMap<String, Buffer>) -> Vec<Tally> {
+        let used = buffers.contains_key(tally::COUNTS) || buffers.contains_key(tally::RATES);
+        if used { self.program.tallies.to_vec() } else { Vec::new() }
+    }
+
     fn generated_buffers(&self) -> Vec<Buffer> {
         let program = self.program;
         let buffer = |name: &str, role, size| Buffer { name: name.to_owned(), role, size };
@@ -301,6 +311,11 @@ impl Builder<'_> {
             let bytes = 4 * stream::record_words(stream) * stream.capacity;
             buffer(&stream::buffer_name(name), Role::Stream, per_path(bytes))
         }));
+        let tallied = Size { fixed: 4 * tally::words(program.tallies), ..Size::default() };
+        buffers.extend([
+            buffer(tally::COUNTS, Role::TallyCounts, tallied),
+            buffer(tally::RATES, Role::TallyRates, tallied),
+        ]);
         buffers.extend([buffer("film", Role::Film, film), buffer("pass_info", Role::Pass, fixed(32))]);
         buffers
     }

@@ -1,7 +1,7 @@
 //! Whole generations of a small pipeline.
 
 use crate::config::model::{Effect, Selection};
-use crate::plan::{Plan, Role, Step};
+use crate::plan::{Access, Plan, Role, Step};
 use crate::source::{FileKind, Sources};
 use crate::{Generated, Refusal};
 
@@ -337,4 +337,61 @@ place = [
     assert_eq!(parts.plan.bytes_per_path, 48);
     let shade = &kernel(&parts.plan, "shade").module;
     assert!(shade.contains("path.length = extractBits(state_2.w, 25u, 5u);"), "{shade}");
+}
+
+/// The pipeline with tallies, and stages that count and read.
+fn with_tallies(declared: &str, used: &str) -> Result<Generated, Refusal> {
+    let pipeline = format!("{PIPELINE}\n[tallies]\n{declared}\n");
+    let imports = "import package::tallies::{count_bounces, bounces_rate};\n";
+    let stages = format!("{imports}{}", STAGES.replace("    eye.throughput *= 0.5;\n", used));
+    crate::generate(&sources(&pipeline, LAYOUT, &stages), &selection(&[]))
+}
+
+const TALLIES: &str = "other = { size = \"3\" }\nbounces = { size = \"max_edges + 1\", doc = \"Bounces.\" }";
+
+#[test]
+fn tallies_have_their_parts_of_two_buffers() {
+    let used = "    count_bounces(path.length);\n    eye.throughput *= bounces_rate(0u);\n";
+    let plan = with_tallies(TALLIES, used).unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan;
+    let parts: Vec<_> = plan.tallies.iter().map(|tally| (tally.name.as_str(), tally.first, tally.size)).collect();
+    assert_eq!(parts, [("other", 0, 3), ("bounces", 3, 6)]);
+    for (role, access) in [(Role::TallyCounts, Access::ReadWrite), (Role::TallyRates, Access::Read)] {
+        let index = plan.buffers.iter().position(|buffer| buffer.role == role).unwrap();
+        assert_eq!(plan.buffers[index].size.fixed, 36);
+        let binding = kernel(&plan, "shade").bindings.iter().find(|binding| binding.buffer == index).unwrap();
+        assert_eq!(binding.access, access);
+        let elsewhere = plan.kernels.iter().filter(|kernel| kernel.name != "shade").flat_map(|kernel| &kernel.bindings);
+        assert!(elsewhere.into_iter().all(|binding| binding.buffer != index));
+    }
+    let shade = &kernel(&plan, "shade").module;
+    assert!(shade.contains("/// Counts at an index of `bounces`: Bounces."), "{shade}");
+    assert!(shade.contains("atomicAdd(&tally_counts[3u + min(index, 5u)], 1u);"), "{shade}");
+}
+
+#[test]
+fn tallies_that_nothing_uses_take_no_space() {
+    let plan = with_tallies(TALLIES, "").unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan;
+    let unused = |role| plan.buffers.iter().all(|buffer| buffer.role != role);
+    assert!(plan.tallies.is_empty() && unused(Role::TallyCounts) && unused(Role::TallyRates));
+    let counting = with_tallies(TALLIES, "    count_bounces(0u);\n").unwrap_or_else(|_| panic!("refused")).plan;
+    assert!(counting.buffers.iter().all(|buffer| buffer.role != Role::TallyRates) && counting.tallies.len() == 2);
+}
+
+#[test]
+fn wrong_tallies_are_refused() {
+    let code = |declared: &str| {
+        let refusal = with_tallies(declared, "    count_bounces(0u);\n").expect_err(declared);
+        assert!(refusal.diagnostics.iter().all(|finding| !finding.labels.is_empty() && !finding.help.is_empty()));
+        refusal.diagnostics.iter().map(|finding| finding.code).collect::<Vec<_>>()
+    };
+    assert_eq!(code("bounces = { size = \"max_edge\" }"), ["K0116"]);
+    assert_eq!(code("bounces = { size = \"max_edges - 5\" }"), ["K0116"]);
+    assert_eq!(code("bounces = { size = \"131073\" }"), ["K0116"]);
+    assert_eq!(code("bounces = { doc = \"no size\" }"), ["K0112"]);
+    assert_eq!(code("bounces = { size = 3 }"), ["K0106"]);
+    assert_eq!(code("bounces = { size = \"3\", span = 3 }"), ["K0102"]);
+    assert_eq!(code("ray = { size = \"3\" }"), ["K0115"]);
+    assert_eq!(code("a_rate = { size = \"3\" }\ncount_a = { size = \"3\" }"), ["K0115"]);
+    assert_eq!(code("splat = { size = \"3\" }"), ["K0114"]);
+    assert_eq!(code("bounce = { size = \"3\" }"), ["K0303"]);
 }

@@ -195,7 +195,8 @@ fn resume(
     until: Until,
     variance: bool,
 ) -> Result<(), Error> {
-    let state = before.state.ok_or_else(|| Error::input("the picture does not say how many samples it has"))?;
+    let state =
+        before.state.as_ref().ok_or_else(|| Error::input("the picture does not say how many samples it has"))?;
     if let Until::Samples(wanted) = until
         && wanted <= state.samples
     {
@@ -207,7 +208,9 @@ fn resume(
             Error::input("the picture has no standard errors to continue").help("render it with `--aov variance`")
         );
     }
-    session.resume(&image.totals(state.samples, state.batches))
+    let mut totals = image.totals(state.samples, state.batches);
+    totals.tallied.clone_from(&state.tallies);
+    session.resume(&totals)
 }
 
 /// The settings as they go into the picture.
@@ -217,7 +220,9 @@ fn metadata(settings: &RenderFile, rendered: &Rendered, until: Until) -> RenderF
         Until::Samples(samples) => Some(samples),
         Until::Seconds(_) | Until::Error(_) => None,
     };
-    settings.state = Some(State { samples: rendered.totals.samples, batches: rendered.totals.batches });
+    let totals = &rendered.totals;
+    let tallies = totals.tallied.clone();
+    settings.state = Some(State { samples: totals.samples, batches: totals.batches, tallies });
     settings
 }
 

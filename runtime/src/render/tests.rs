@@ -93,6 +93,7 @@ fn plan(film: Accumulate) -> Plan {
             Step::Loop { rounds: 2, body: vec![Step::Indirect { kernel: 3, slot: 1 }] },
         ],
         counters: vec![counter("rays_primary", 1), counter("rays_visibility", 2), counter("overflow", 4)],
+        tallies: Vec::new(),
         film,
         bytes_per_path: 4,
         needs: Needs { subgroup: false, int64_atomics: fixed, float32_atomics: !fixed },

@@ -1,0 +1,71 @@
+//! `package::tallies`: counting, and how often earlier samples counted.
+
+use crate::config::evaluate_size;
+use crate::config::model::Pipeline;
+use crate::diagnostic::Diagnostic;
+use crate::plan::Tally;
+use std::fmt::Write;
+
+/// The WGSL name of the buffer of counts.
+pub(super) const COUNTS: &str = "tally_counts";
+/// The WGSL name of the buffer of rates.
+pub(super) const RATES: &str = "tally_rates";
+
+/// The tallies of a pipeline, one behind the other.
+///
+/// # Errors
+/// K0116 a size that cannot be evaluated.
+pub(super) fn tallies(pipeline: &Pipeline) -> Result<Vec<Tally>, Diagnostic> {
+    let mut tallies = Vec::new();
+    let mut first = 0;
+    for (name, declared) in &pipeline.tallies {
+        let size = evaluate_size(pipeline, &declared.size)?;
+        tallies.push(Tally { name: name.clone(), first, size });
+        first = size.saturating_add(first);
+    }
+    Ok(tallies)
+}
+
+/// Words of each buffer.
+pub(super) fn words(tallies: &[Tally]) -> u64 {
+    tallies.iter().map(|tally| u64::from(tally.size)).sum()
+}
+
+/// The module. An index beyond the last counts as the last: it must not reach into the next tally.
+pub(super) fn module(pipeline: &Pipeline, tallies: &[Tally]) -> String {
+    let mut text = format!(
+        "import package::real::real;\n\n\
+         /// Counts of the present samples, tally by tally.\n\
+         var<storage, read_write> {COUNTS}: array<atomic<u32>>;\n\n\
+         /// Counts of earlier samples divided by the number of their paths.\n\
+         var<storage, read> {RATES}: array<f32>;\n"
+    );
+    for tally in tallies {
+        let doc = pipeline.tallies.get(&tally.name).map_or("", |declared| declared.doc.as_str());
+        push_functions(&mut text, tally, doc);
+    }
+    text
+}
+
+fn push_functions(text: &mut String, tally: &Tally, doc: &str) {
+    let Tally { name, first, size } = tally;
+    let colon = if doc.is_empty() { "." } else { ": " };
+    let doc = doc.replace('\n', " ");
+    let word = word(*first, *size);
+    let _ = write!(
+        text,
+        "\n/// Counts at an index of `{name}`{colon}{doc}\n\
+         fn count_{name}(index: u32) {{\n    \
+             atomicAdd(&{COUNTS}[{word}], 1u);\n\
+         }}\n\n\
+         /// How often a path of the earlier samples counted at an index of `{name}`.\n\
+         fn {name}_rate(index: u32) -> real {{\n    \
+             return {RATES}[{word}];\n\
+         }}\n"
+    );
+}
+
+fn word(first: u32, size: u32) -> String {
+    let index = format!("min(index, {}u)", size - 1);
+    if first == 0 { index } else { format!("{first}u + {index}") }
+}
