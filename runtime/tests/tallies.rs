@@ -151,7 +151,7 @@ fn the_pilot_leaves_no_light_and_no_rays_and_is_not_the_picture() {
         assert!((pixel.iter().sum::<f32>() - 2.0).abs() < 1e-5, "{pixel:?}");
     }
     assert_eq!(one.counters, runtime::execute::Counters::default());
-    assert!(one.profile.passes <= 3, "the passes of the picture, not those of the pilot");
+    assert!(one.profile.passes <= 1, "the pilot was measured too");
 }
 
 #[test]
