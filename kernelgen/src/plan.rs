@@ -3,9 +3,13 @@
 use crate::config::model::{Accumulate, RayKind};
 use serde::Serialize;
 
+/// `path_count` is a multiple of this: so many slots fill whole workgroups and whole blocks of every layout, and a stream may have room
+/// for a fraction of a record per slot.
+pub const SLOT_GRAIN: u32 = 1024;
+
 /// Buffers, kernels and the program of one pass.
 ///
-/// A pass takes `active` path slots (at most `path_count`) through the program once. The runtime writes the `pass_info` uniform
+/// A pass takes `active` path slots (at most `slots_per_grain` of every `SLOT_GRAIN` that there are) through the program once. The runtime writes the `pass_info` uniform
 /// (see `Role::Pass`) before it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Plan {
@@ -24,6 +28,8 @@ pub struct Plan {
     pub film: Accumulate,
     /// Bytes of state a path slot takes, all tables.
     pub bytes_per_path: u32,
+    /// Slots that a pass may use of every `SLOT_GRAIN`: all, unless a stream has less room than all could fill in one round.
+    pub slots_per_grain: u32,
     /// Whether kernels use subgroup operations, f16, f64, 64-bit atomics or float atomics: features to ask of the adapter.
     pub needs: Needs,
 }

@@ -2,7 +2,7 @@
 
 use crate::device::Gpu;
 use crate::error::Error;
-use kernelgen::plan::{Access, Buffer, Plan, Role};
+use kernelgen::plan::{Access, Buffer, Plan, Role, SLOT_GRAIN};
 use wgpu::BufferUsages;
 
 /// Path slots on a GPU when not asked otherwise: enough to fill the largest cards and to hide the launches of a round.
@@ -11,8 +11,8 @@ const DEFAULT_PATHS_GPU: u64 = 1 << 22;
 const DEFAULT_PATHS_CPU: u64 = 1 << 17;
 /// The most that may be asked for: 32-bit ray counters must survive a pass of a thousand rounds.
 const MOST_PATHS: u64 = 1 << 22;
-/// Slots come in multiples of this: whole workgroups and whole blocks of every `aosoa` layout.
-const GRAIN: u64 = 1024;
+/// Slots come in multiples of this.
+const GRAIN: u64 = SLOT_GRAIN as u64;
 
 /// Looks a scene resource up by its WGSL name.
 pub type Resources<'a> = dyn Fn(&str) -> Option<&'a [u8]> + 'a;
@@ -85,6 +85,11 @@ pub fn choose_path_count(
         }
     }
     u32::try_from(most.max(1) * GRAIN).map_err(|_| Error::failed("more path slots than 32 bits hold"))
+}
+
+/// How many of the path slots one pass may use.
+pub fn usable_slots(plan: &Plan, path_count: u32) -> u32 {
+    path_count / SLOT_GRAIN * plan.slots_per_grain
 }
 
 fn size_of(buffer: &Buffer, path_count: u64, pixels: u64) -> u64 {

@@ -1,6 +1,6 @@
 //! A render from plan to picture: splits pixels x samples into passes and batches, keeps passes in flight, adds up what they count.
 
-use crate::buffers::{Buffers, Resources, choose_path_count};
+use crate::buffers::{Buffers, Resources, choose_path_count, usable_slots};
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::execute::{Counters, Executor, IN_FLIGHT, Pass};
@@ -86,7 +86,7 @@ pub struct Session {
     /// Whether the pilot is still to come.
     unpiloted: bool,
     settings: Settings,
-    path_count: u32,
+    slots: u32,
     pass_limit: u32,
     samples: u32,
     batches: u32,
@@ -121,6 +121,7 @@ impl Session {
         let executor = Executor::new(gpu, plan, &buffers)?;
         let tallies = Tallies::new(plan, &buffers);
         gpu.check()?;
+        let slots = usable_slots(plan, path_count);
         Ok(Self {
             gpu: gpu.clone(),
             executor,
@@ -128,8 +129,8 @@ impl Session {
             unpiloted: tallies.as_ref().is_some_and(Tallies::have_rates),
             tallies,
             settings,
-            path_count,
-            pass_limit: path_count,
+            slots,
+            pass_limit: slots,
             samples: 0,
             batches: 0,
             spread_known: true,
@@ -141,11 +142,6 @@ impl Session {
             seconds: 0.0,
             sizes: std::collections::VecDeque::new(),
         })
-    }
-
-    /// Path slots.
-    pub fn path_count(&self) -> u32 {
-        self.path_count
     }
 
     /// Continues an earlier render: its samples are neither lost nor taken again. Call before `run`.
@@ -271,7 +267,7 @@ impl Session {
     /// A pass of whole samples at most, and an eighth of the work at most.
     fn wanted_samples(&self, until: Until) -> u32 {
         let pixels = self.settings.size[0] * self.settings.size[1];
-        let natural = (self.path_count / pixels).max(1);
+        let natural = (self.slots / pixels).max(1);
         match until {
             Until::Samples(wanted) => {
                 let run = wanted - self.samples_before.min(wanted);
@@ -340,10 +336,10 @@ impl Session {
     fn pace(&mut self, active: u32, seconds: f64) {
         let fitting = f64::from(active) * PASS_SECONDS / seconds.max(1e-6);
         let slow = seconds > PASS_SECONDS;
-        let quick = seconds < PASS_SECONDS / 4.0 && active >= self.pass_limit && self.pass_limit < self.path_count;
+        let quick = seconds < PASS_SECONDS / 4.0 && active >= self.pass_limit && self.pass_limit < self.slots;
         if slow || quick {
             let wanted = fitting.min(2.0 * f64::from(self.pass_limit)) as u32;
-            self.pass_limit = (wanted / 1024 * 1024).max(SMALLEST_PASS).min(self.path_count);
+            self.pass_limit = (wanted / 1024 * 1024).max(SMALLEST_PASS).min(self.slots);
         }
     }
 

@@ -45,6 +45,8 @@ pub struct Rendering {
     pub rejected: u64,
     /// Rays of all kinds.
     pub rays: u64,
+    /// Visibility rays among them.
+    pub visibility: u64,
     /// Sums of a fixed-point film: what must be equal bit for bit where images must be. Empty for other films.
     pub sums: Vec<i64>,
 }
@@ -192,6 +194,7 @@ fn rendering(rendered: &Rendered) -> Rendering {
         pixels: pixels(rendered.size, &rendered.mean, rendered.standard_error.as_ref().unwrap_or(&unknown)),
         rejected: counters.rejected,
         rays: counters.primary + counters.secondary + counters.deep + counters.visibility,
+        visibility: counters.visibility,
         sums: match &rendered.totals.sums {
             Sums::Fixed(units) => units.clone(),
             Sums::Float(_) => Vec::new(),

@@ -248,6 +248,8 @@ pub struct Schedule {
     pub accumulate: Accumulate,
     /// Streams resolved by a kernel of their own; the others inline.
     pub batch: Vec<Spanned<String>>,
+    /// Records that each batched stream has room for, per path slot.
+    pub capacity: Spanned<f64>,
 }
 
 /// How a survivor finds its place in a queue.

@@ -8,9 +8,12 @@ use crate::diagnostic::Diagnostic;
 use crate::source::Spanned;
 
 /// Keys of `[schedule]`.
-pub const KEYS: [&str; 7] = ["fuse", "queue", "workgroup", "load", "until", "accumulate", "batch"];
+pub const KEYS: [&str; 8] = ["fuse", "queue", "workgroup", "load", "until", "accumulate", "batch", "capacity"];
 /// Keys of `[precision]`.
 pub const PRECISION_KEYS: [&str; 1] = ["real"];
+
+/// More room than the longest pass could use; whatever the number of slots, 32 bits count so many records.
+const MOST_CAPACITY: f64 = 1000.0;
 
 const WORKGROUPS: [u32; 6] = [32, 64, 128, 256, 512, 1024];
 
@@ -24,6 +27,8 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
     let batch = section.get("batch").and_then(|item| names(&item, findings));
+    let capacity = section.require("capacity", "records per path slot in a batched stream: `capacity = 4`", findings);
+    let capacity = capacity.and_then(|item| room(&item, findings));
     Some(Schedule {
         name: file.name.clone(),
         doc: file.doc.clone(),
@@ -31,6 +36,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         workgroup: workgroup?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
         batch: batch.unwrap_or_default(),
+        capacity: capacity?,
     })
 }
 
@@ -78,6 +84,19 @@ fn workgroup_size(item: &Item<'_>, findings: &mut Findings) -> Option<Spanned<u3
         findings.push(refused);
     }
     size.map(|value| Spanned { value, span: item.span() })
+}
+
+/// A positive number of records per path slot.
+fn room(item: &Item<'_>, findings: &mut Findings) -> Option<Spanned<f64>> {
+    let value = item.real(findings)?;
+    if value > 0.0 && value <= MOST_CAPACITY {
+        return Some(Spanned { value, span: item.span() });
+    }
+    let refused = Diagnostic::error("K0107", format!("`{}` is out of range", item.path))
+        .at(item.span(), "too small or too large")
+        .help(format!("write a number above 0, and at most {MOST_CAPACITY}: records per path slot"));
+    findings.push(refused);
+    None
 }
 
 /// A list of names; one name alone is a list of one, which spares quotes in `--set batch=connection`.

@@ -36,7 +36,10 @@ fn sources(texts: &[(&str, &str)]) -> Sources {
     let shipped = [
         ("pipelines/base.toml", BASE),
         ("layouts/soa.toml", "[layout]\norder = \"soa\"\nlane = 1\n"),
-        ("schedules/wavefront.toml", "[schedule]\nqueue = \"atomic\"\nworkgroup = 64\naccumulate = \"racy\"\n"),
+        (
+            "schedules/wavefront.toml",
+            "[schedule]\nqueue = \"atomic\"\nworkgroup = 64\naccumulate = \"racy\"\ncapacity = 4\n",
+        ),
         ("precisions/f32.toml", "[precision]\nreal = \"f32\"\n"),
     ];
     for (key, text) in shipped.iter().chain(texts) {
@@ -156,6 +159,17 @@ fn set_points_into_its_own_text() {
     let file = sources.file(span.file);
     assert_eq!(file.name, "--set");
     assert_eq!(&file.text[span.start as usize..span.end as usize], "50");
+}
+
+#[test]
+fn a_capacity_is_a_positive_number() {
+    assert_eq!(with_set(&[("capacity", "0.25")]).schedule.capacity.value, 0.25);
+    assert_eq!(with_set(&[("schedule.capacity", "14")]).schedule.capacity.value, 14.0);
+    for refused in ["0", "-1", "1000.5", "inf", "nan"] {
+        let found = codes(&[], "pipelines/base.toml", &[("schedule.capacity", refused)]);
+        assert!(found == ["K0107"] || found == ["K0106"], "{refused}: {found:?}");
+    }
+    assert_eq!(codes(&[], "pipelines/base.toml", &[("schedule.capacity", "[]")]), ["K0106"]);
 }
 
 #[test]

@@ -7,6 +7,7 @@ mod memory;
 mod modules;
 mod program;
 mod queue;
+mod room;
 mod signature;
 mod stream;
 mod tally;
@@ -164,7 +165,7 @@ fn add_state_modules(
         ("control", queue::control_module(queues)),
         ("queue", queue::queue_module(queues, kind)),
         ("tables", memory::module(placement)),
-        ("streams", stream::module(&variant.pipeline, wiring)),
+        ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule))),
     ];
     for (name, text) in texts {
         add_module(sources, modules, name, text);

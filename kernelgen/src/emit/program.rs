@@ -2,7 +2,8 @@
 
 use super::kernel::{self, Source};
 use super::memory::{self, Access};
-use super::queue::{self, Prepared, Queues};
+use super::queue::{self, Entries, Prepared, Queues};
+use super::room;
 use super::stream;
 use super::tally;
 use super::wiring::Wiring;
@@ -11,7 +12,7 @@ use crate::config::model::{Accumulate, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
 use crate::layout::{Placement, StateLeaf};
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
-use crate::plan::{Binding, Buffer, Counter, Kernel, Needs, Plan, Role, Size, Step, Tally};
+use crate::plan::{Binding, Buffer, Counter, Kernel, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexMap;
 use std::collections::{BTreeMap, BTreeSet};
@@ -78,38 +79,58 @@ impl Builder<'_> {
         let start_rays = program.wiring.stages.get(start).and_then(|stage| stage.rays);
         let begin = self.housekeeping("begin", queue::begin_kernel(start_rays), 64);
         let first = self.stage(start, Source::Slots);
-        let body = self.round();
-        let finish = self.housekeeping("finish", queue::finish_kernel(program.queues), 1);
-        vec![
+        let consumers = self.consumers();
+        let body = self.round(&consumers);
+        let left: Vec<Prepared> =
+            consumers.keys().map(|stream| self.prepared_stream(stream, Entries::Stream(stream.clone()))).collect();
+        let finish = self.housekeeping("finish", queue::finish_kernel(program.queues, &left), 1);
+        let mut steps = vec![
             Step::Single { kernel: begin },
             Step::Dispatch { kernel: first },
             Step::Loop { rounds: program.rounds, body },
             Step::Single { kernel: finish },
-        ]
+        ];
+        steps.extend(consumers.into_values());
+        steps
     }
 
-    /// The steps of a round: stages in groups behind one prepare kernel each, then the consumers of streams.
-    fn round(&mut self) -> Vec<Step> {
+    /// The dispatch of each batched stream's consumer.
+    fn consumers(&mut self) -> IndexMap<String, Step> {
+        let queues = self.program.queues;
+        let mut consumers = IndexMap::new();
+        for stream in &queues.streams {
+            let kernel = self.consumer(stream);
+            let slot = queues.of_stream(stream).unwrap_or_default();
+            consumers.insert(stream.clone(), Step::Indirect { kernel, slot });
+        }
+        consumers
+    }
+
+    /// The steps of a round: stages in groups behind one prepare kernel each, which also empties the streams that this group is the
+    /// first to push to, if need be.
+    fn round(&mut self, consumers: &IndexMap<String, Step>) -> Vec<Step> {
         let queues = self.program.queues;
         let mut body = Vec::new();
         for group in self.groups() {
-            let prepared: Vec<Prepared> = group.iter().map(|stage| self.prepared_stage(stage)).collect();
+            let streams: Vec<&String> = queues.streams.iter().filter(|stream| self.begins(&group, stream)).collect();
+            let mut prepared: Vec<Prepared> = streams.iter().map(|stream| self.prepared_full(stream, &group)).collect();
+            prepared.extend(group.iter().map(|stage| self.prepared_stage(stage)));
             let name = format!("prepare_{}", group[0]);
             self.prepare(&name, &prepared, &mut body);
+            body.extend(streams.into_iter().filter_map(|stream| consumers.get(stream)).cloned());
             for stage in group {
                 let kernel = self.stage(&stage, Source::Queue);
                 body.push(Step::Indirect { kernel, slot: queues.of_stage(&stage).unwrap_or_default() });
             }
         }
-        if let Some(first) = queues.streams.first() {
-            let prepared: Vec<Prepared> = queues.streams.iter().map(|stream| self.prepared_stream(stream)).collect();
-            self.prepare(&format!("prepare_{first}_stream"), &prepared, &mut body);
-        }
-        for stream in &queues.streams {
-            let kernel = self.consumer(stream);
-            body.push(Step::Indirect { kernel, slot: queues.of_stream(stream).unwrap_or_default() });
-        }
         body
+    }
+
+    /// Whether this group is the first of a round that may push to the stream.
+    fn begins(&self, group: &[String], stream: &str) -> bool {
+        let pushes = &self.program.wiring.streams[stream].pushes;
+        let first = self.program.queues.stages.iter().find(|stage| pushes.contains_key(*stage));
+        first.is_some_and(|first| group.contains(first))
     }
 
     /// Consecutive stages of which none feeds a later one: their queues are complete when the first of them runs.
@@ -132,12 +153,19 @@ impl Builder<'_> {
 
     fn prepared_stage(&self, stage: &str) -> Prepared {
         let rays = self.program.wiring.stages[stage].rays;
-        Prepared { constant: queue::stage_constant(stage), capacity: 1, rays }
+        Prepared { entries: Entries::Stage(stage.to_owned()), rays }
     }
 
-    fn prepared_stream(&self, name: &str) -> Prepared {
-        let stream = &self.program.wiring.streams[name];
-        Prepared { constant: queue::stream_constant(name), capacity: stream.capacity, rays: stream.rays }
+    fn prepared_stream(&self, name: &str, entries: Entries) -> Prepared {
+        Prepared { entries, rays: self.program.wiring.streams[name].rays }
+    }
+
+    /// Empties a stream before a group of stages if this group and those after it might overfill it.
+    fn prepared_full(&self, name: &str, group: &[String]) -> Prepared {
+        let Program { wiring, queues, .. } = self.program;
+        let done = queues.stages.iter().position(|stage| *stage == group[0]).unwrap_or_default();
+        let ahead = room::ahead(wiring, &queues.stages[done..], &wiring.streams[name].pushes);
+        self.prepared_stream(name, Entries::FullStream { stream: name.to_owned(), ahead })
     }
 
     /// Adds a prepare kernel; the first of a round counts the round.
@@ -260,6 +288,7 @@ impl Builder<'_> {
             tallies,
             film: self.program.variant.schedule.accumulate,
             bytes_per_path: placement.bytes_per_path(),
+            slots_per_grain: room::slots(self.program.wiring, &self.program.variant.schedule),
             needs,
             buffers: buffers.into_values().collect(),
         };
@@ -308,8 +337,8 @@ impl Builder<'_> {
         ]);
         let streams = program.wiring.streams.iter().filter(|(_, stream)| stream.batched);
         buffers.extend(streams.map(|(name, stream)| {
-            let bytes = 4 * stream::record_words(stream) * stream.capacity;
-            buffer(&stream::buffer_name(name), Role::Stream, per_path(bytes))
+            let bytes = 4 * stream::record_words(stream) * room::records(&program.variant.schedule);
+            buffer(&stream::buffer_name(name), Role::Stream, per_path(bytes.div_ceil(SLOT_GRAIN)))
         }));
         let tallied = Size { fixed: 4 * tally::words(program.tallies), ..Size::default() };
         buffers.extend([

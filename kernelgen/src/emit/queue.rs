@@ -1,7 +1,9 @@
 //! Queues and counters: the modules `control` and `queue`, and the kernels that run between the stages.
 
+use super::stream::room_function;
 use super::text::Imports;
 use crate::config::model::{QueueKind, RayKind};
+use indexmap::IndexMap;
 use std::fmt::Write;
 
 /// Words of the control buffer before those of the queues, by name; all but the last are counters that the host reads.
@@ -71,6 +73,8 @@ pub(super) fn control_module(queues: &Queues) -> String {
          var<storage, read_write> control: array<atomic<u32>>;\n\n\
          /// The word that counts what waits in a queue.\n\
          fn waiting_word(number: u32) -> u32 {{\n    return {}u + 2u * number;\n}}\n\n\
+         /// How many entries wait in a queue.\n\
+         fn waiting(number: u32) -> u32 {{\n    return atomicLoad(&control[waiting_word(number)]);\n}}\n\n\
          /// How many entries the kernel of a queue takes.\n\
          fn running(number: u32) -> u32 {{\n    return atomicLoad(&control[{}u + 2u * number]);\n}}\n",
         queues.control_words(),
@@ -103,7 +107,7 @@ fn count_ray(word: u32) {
 /// `package::queue`: how paths wait for stages.
 pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
     let mut text = String::from(
-        "import package::control::{control, waiting_word};\n\
+        "import package::control::{control, waiting, waiting_word};\n\
          import package::pass::path_count;\n\n",
     );
     for (stage, number) in queues.stages.iter().zip(0..) {
@@ -120,7 +124,7 @@ pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
     text.push_str(APPEND);
     let _ = write!(
         text,
-        "{START_QUEUE}    let groups = (entries + {}u) / {}u;{START_QUEUE_END}",
+        "{START_QUEUE}    let groups = (entries + {}u) / {}u;{SIZE_DISPATCH_END}",
         queues.workgroup - 1,
         queues.workgroup
     );
@@ -173,12 +177,24 @@ fn append(number: u32) -> u32 {
 const START_QUEUE: &str = r"
 /// Hands what waits in a queue, at most `capacity`, to its kernel and says how many that is.
 fn start_queue(number: u32, capacity: u32) -> u32 {
-    let word = waiting_word(number);
-    let entries = min(atomicExchange(&control[word], 0u), capacity);
-    atomicStore(&control[word + 1u], entries);
+    return size_dispatch(number, min(atomicExchange(&control[waiting_word(number)], 0u), capacity));
+}
+
+/// As `start_queue` if `coming` further entries might find no room behind those that wait, else lets them wait.
+fn start_full_queue(number: u32, capacity: u32, coming: u32) -> u32 {
+    let room = capacity - min(waiting(number), capacity);
+    if coming <= room {
+        return size_dispatch(number, 0u);
+    }
+    return start_queue(number, capacity);
+}
+
+/// Makes the kernel of a queue take so many entries.
+fn size_dispatch(number: u32, entries: u32) -> u32 {
+    atomicStore(&control[waiting_word(number) + 1u], entries);
 ";
 
-const START_QUEUE_END: &str = r"
+const SIZE_DISPATCH_END: &str = r"
     arguments[3u * number] = min(groups, 65535u);
     arguments[3u * number + 1u] = (groups + 65534u) / 65535u;
     arguments[3u * number + 2u] = 1u;
@@ -214,48 +230,95 @@ pub(super) fn begin_kernel(start_rays: Option<RayKind>) -> String {
     )
 }
 
-/// A capacity as text.
-pub(super) fn multiple_of_path_count(factor: u32) -> String {
-    if factor == 1 { "path_count".to_owned() } else { format!("{factor}u * path_count") }
+/// What a prepare kernel hands to a kernel behind it.
+#[derive(Clone, Debug)]
+pub(super) enum Entries {
+    /// All paths that wait for a stage.
+    Stage(String),
+    /// All records that wait in a stream.
+    Stream(String),
+    /// All records that wait in a stream or none: none if as many can join them as waiting paths may still push. `ahead` holds the
+    /// most records of a path by the stage that it waits for.
+    FullStream {
+        /// The stream.
+        stream: String,
+        /// Weights of the stages' queues.
+        ahead: IndexMap<String, u32>,
+    },
 }
 
 /// What a prepare kernel does for one queue.
 #[derive(Clone, Debug)]
 pub(super) struct Prepared {
-    /// The WGSL constant of the queue.
-    pub constant: String,
-    /// Entries that it has room for, in units of `path_count`.
-    pub capacity: u32,
+    /// What it hands over.
+    pub entries: Entries,
     /// What its rays are counted as.
     pub rays: Option<RayKind>,
 }
 
-/// The kernel before the stages of some queues.
+impl Prepared {
+    /// The statement that does it.
+    fn statement(&self, imports: &mut Imports) -> String {
+        let call = self.call(imports);
+        let Some(kind) = self.rays else { return format!("    {call};\n") };
+        let (item, word) = match kind {
+            RayKind::Walk => ("walk_rays_word", "walk_rays_word()"),
+            RayKind::Visibility => ("CONTROL_RAYS_VISIBILITY", "CONTROL_RAYS_VISIBILITY"),
+        };
+        imports.add("control", ["control", item]);
+        format!("    atomicAdd(&control[{word}], {call});\n")
+    }
+
+    /// The call that sizes the dispatch and gives the number of entries.
+    fn call(&self, imports: &mut Imports) -> String {
+        match &self.entries {
+            Entries::Stage(stage) => {
+                let constant = stage_constant(stage);
+                imports.add("queue", ["start_queue", constant.as_str()]);
+                imports.add("pass", ["path_count"]);
+                format!("start_queue({constant}, path_count)")
+            }
+            Entries::Stream(stream) => {
+                let (constant, room) = (stream_constant(stream), room_function(stream));
+                imports.add("queue", ["start_queue", constant.as_str()]);
+                imports.add("streams", [room.as_str()]);
+                format!("start_queue({constant}, {room}())")
+            }
+            Entries::FullStream { stream, ahead } => {
+                let (constant, room) = (stream_constant(stream), room_function(stream));
+                imports.add("queue", ["start_full_queue", constant.as_str()]);
+                imports.add("streams", [room.as_str()]);
+                format!("start_full_queue({constant}, {room}(), {})", weighted(ahead, imports))
+            }
+        }
+    }
+}
+
+/// What waits in queues, each times its weight.
+fn weighted(weights: &IndexMap<String, u32>, imports: &mut Imports) -> String {
+    imports.add("control", ["waiting"]);
+    let mut terms = Vec::new();
+    for (stage, weight) in weights {
+        let constant = stage_constant(stage);
+        imports.add("queue", [constant.as_str()]);
+        terms.push(match weight {
+            1 => format!("waiting({constant})"),
+            _ => format!("{weight}u * waiting({constant})"),
+        });
+    }
+    terms.join(" + ")
+}
+
+/// The kernel before the stages of some queues. Streams stand before stages: what is about to start no longer waits.
 pub(super) fn prepare_kernel(name: &str, first_of_round: bool, queues: &[Prepared]) -> String {
     let mut imports = Imports::default();
     let mut body = String::new();
-    imports.add("queue", ["start_queue"]);
-    imports.add("pass", ["path_count"]);
     if first_of_round {
         imports.add("control", ["control", "CONTROL_ROUND"]);
         body.push_str("    atomicAdd(&control[CONTROL_ROUND], 1u);\n");
     }
     for prepared in queues {
-        imports.add("queue", [prepared.constant.as_str()]);
-        let capacity = multiple_of_path_count(prepared.capacity);
-        let call = format!("start_queue({}, {capacity})", prepared.constant);
-        let _ = match prepared.rays {
-            None => writeln!(body, "    {call};"),
-            Some(kind) => {
-                let word = match kind {
-                    RayKind::Walk => "walk_rays_word",
-                    RayKind::Visibility => "CONTROL_RAYS_VISIBILITY",
-                };
-                imports.add("control", ["control", word]);
-                let word = if kind == RayKind::Walk { "walk_rays_word()" } else { word };
-                writeln!(body, "    atomicAdd(&control[{word}], {call});")
-            }
-        };
+        body.push_str(&prepared.statement(&mut imports));
     }
     format!(
         "{imports}\n\
@@ -265,21 +328,22 @@ pub(super) fn prepare_kernel(name: &str, first_of_round: bool, queues: &[Prepare
     )
 }
 
-/// The kernel after the loop: whatever still waits was cut off.
-pub(super) fn finish_kernel(queues: &Queues) -> String {
+/// The kernel after the loop: whatever path still waits was cut off, and what is left in the streams is handed to their consumers.
+pub(super) fn finish_kernel(queues: &Queues, streams: &[Prepared]) -> String {
     let mut imports = Imports::default();
-    imports.add("control", ["control", "waiting_word", "CONTROL_UNFINISHED"]);
+    imports.add("control", ["control", "waiting", "CONTROL_UNFINISHED"]);
+    let body: String = streams.iter().map(|prepared| prepared.statement(&mut imports)).collect();
     format!(
         "{imports}\n\
-         /// Counts what still waits: more than none means that the rounds did not suffice.\n\
+         /// Counts the paths that still wait: more than none means that the rounds did not suffice. Then empties the streams.\n\
          @compute @workgroup_size(1)\n\
          fn finish_main() {{\n    \
              var left = 0u;\n    \
              for (var number = 0u; number < {}u; number += 1u) {{\n        \
-                 left += atomicLoad(&control[waiting_word(number)]);\n    \
+                 left += waiting(number);\n    \
              }}\n    \
              atomicStore(&control[CONTROL_UNFINISHED], left);\n\
-         }}\n",
-        queues.count()
+         {body}}}\n",
+        queues.stages.len()
     )
 }

@@ -1,6 +1,7 @@
 //! `package::streams`: what happens to a record that a stage pushes.
 
-use super::queue::{multiple_of_path_count, stream_constant};
+use super::queue::stream_constant;
+use super::room;
 use super::text::{COMPONENTS, Imports};
 use super::wiring::{WiredStream, Wiring};
 use crate::config::model::{Pipeline, RayKind};
@@ -29,15 +30,24 @@ pub(super) fn analysis_module(pipeline: &Pipeline) -> String {
     format!("{imports}{body}")
 }
 
-/// The module for kernels: batched streams append to their buffer, the others call their consumer.
-pub(super) fn module(pipeline: &Pipeline, wiring: &Wiring) -> String {
+/// The WGSL function that says how many records a batched stream has room for.
+pub(super) fn room_function(stream: &str) -> String {
+    format!("{stream}_room")
+}
+
+/// The module for kernels: batched streams append to their buffer, which has room for `records` (see `room::records`), the others
+/// call their consumer.
+pub(super) fn module(pipeline: &Pipeline, wiring: &Wiring, records: u32) -> String {
     let mut imports = Imports::default();
     let mut body = String::new();
     for (name, declared) in &pipeline.streams {
         let record = declared.record.value.as_str();
         imports.add("state", [record]);
         match wiring.streams.get(name) {
-            Some(stream) if stream.batched => push_batched(&mut imports, &mut body, name, record, stream),
+            Some(stream) if stream.batched => {
+                push_room(&mut imports, &mut body, name, records);
+                push_batched(&mut imports, &mut body, name, record, stream);
+            }
             Some(stream) => push_inline(&mut imports, &mut body, name, record, stream),
             None => push_nowhere(&mut body, name, record),
         }
@@ -74,30 +84,37 @@ fn push_inline(imports: &mut Imports, body: &mut String, name: &str, record: &st
     );
 }
 
+fn push_room(imports: &mut Imports, body: &mut String, name: &str, records: u32) {
+    imports.add("pass", ["path_count"]);
+    let _ = write!(
+        body,
+        "\n/// Records that the stream `{name}` has room for; it is emptied before more can come.\n\
+         fn {}() -> u32 {{\n    return {};\n}}\n",
+        room_function(name),
+        room::text(records)
+    );
+}
+
 fn push_batched(imports: &mut Imports, body: &mut String, name: &str, record: &str, stream: &WiredStream) {
     let buffer = buffer_name(name);
     let constant = stream_constant(name);
     imports.add("control", ["control", "CONTROL_OVERFLOW"]);
     imports.add("queue", ["append", constant.as_str()]);
-    imports.add("pass", ["path_count"]);
     imports.add("real", ["real", "vec2r", "vec3r"]);
-    let capacity = format!("{name}_capacity");
+    let room = room_function(name);
     let _ = write!(
         body,
         "\n/// Records that wait for `{}`, a plane a word.\n\
-         var<storage, read_write> {buffer}: array<u32>;\n\n\
-         /// Records that the stream has room for: as many as a round can push.\n\
-         fn {capacity}() -> u32 {{\n    return {};\n}}\n",
+         var<storage, read_write> {buffer}: array<u32>;\n",
         stream.entry.name,
-        multiple_of_path_count(stream.capacity)
     );
     let _ = write!(
         body,
-        "\n/// Keeps a record for the end of the round.\n\
+        "\n/// Keeps a record until the stream is emptied.\n\
          fn push_{name}(record: {record}) {{\n    \
-             let capacity = {capacity}();\n    \
+             let room = {room}();\n    \
              let index = append({constant});\n    \
-             if index >= capacity {{\n        \
+             if index >= room {{\n        \
                  atomicAdd(&control[CONTROL_OVERFLOW], 1u);\n        \
                  return;\n    \
              }}\n"
@@ -109,7 +126,7 @@ fn push_batched(imports: &mut Imports, body: &mut String, name: &str, record: &s
         body,
         "}}\n\n/// Takes a record out.\n\
          fn load_{name}(index: u32) -> {record} {{\n    \
-             let capacity = {capacity}();\n    \
+             let room = {room}();\n    \
              var record: {record};\n"
     );
     let mut plane = 0;
@@ -126,8 +143,8 @@ fn push_batched(imports: &mut Imports, body: &mut String, name: &str, record: &s
 fn plane_address(plane: u32) -> String {
     match plane {
         0 => "index".to_owned(),
-        1 => "capacity + index".to_owned(),
-        _ => format!("{plane}u * capacity + index"),
+        1 => "room + index".to_owned(),
+        _ => format!("{plane}u * room + index"),
     }
 }
 

@@ -113,7 +113,7 @@ fn resolve(connection: ptr<function, Connection>) {
 "#;
 
 const LAYOUT: &str = "doc = \"\"\n[layout]\norder = \"aos\"\nlane = 4\ndead = \"drop\"\n";
-const SCHEDULE: &str = "doc = \"\"\n[schedule]\nfuse = []\nqueue = \"subgroup\"\nworkgroup = 64\nload = \"entry\"\nuntil = \"empty\"\naccumulate = \"atomic_f32\"\nbatch = [\"connection\"]\n";
+const SCHEDULE: &str = "doc = \"\"\n[schedule]\nfuse = []\nqueue = \"subgroup\"\nworkgroup = 64\nload = \"entry\"\nuntil = \"empty\"\naccumulate = \"atomic_f32\"\nbatch = [\"connection\"]\ncapacity = 4\n";
 const PRECISION: &str = "doc = \"\"\n[precision]\nreal = \"f32\"\n";
 
 fn sources(pipeline: &str, layout: &str, stages: &str) -> Sources {
@@ -166,6 +166,15 @@ fn kernel<'a>(plan: &'a Plan, name: &str) -> &'a crate::plan::Kernel {
     plan.kernels.iter().find(|kernel| kernel.name == name).unwrap()
 }
 
+/// The kernels of some steps.
+fn names<'a>(plan: &'a Plan, steps: impl IntoIterator<Item = &'a Step>) -> Vec<&'a str> {
+    let name = |step: &Step| match step {
+        Step::Dispatch { kernel } | Step::Single { kernel } | Step::Indirect { kernel, .. } => *kernel,
+        Step::Loop { .. } => panic!("{step:?}"),
+    };
+    steps.into_iter().map(|step| plan.kernels[name(step)].name.as_str()).collect()
+}
+
 #[test]
 fn every_order_and_lane_generates() {
     for order in ["aos", "soa", "aosoa2", "aosoa32"] {
@@ -216,26 +225,71 @@ fn dead_leaves_are_not_stored() {
 #[test]
 fn a_round_prepares_queues_before_their_stages() {
     let plan = generated(&[]).plan;
-    let [Step::Single { .. }, Step::Dispatch { kernel: start }, Step::Loop { rounds: 5, body }, Step::Single { .. }] =
-        plan.program.as_slice()
-    else {
+    let [begin, first, Step::Loop { rounds: 5, body }, after @ ..] = plan.program.as_slice() else {
         panic!("{:?}", plan.program)
     };
-    assert_eq!(plan.kernels[*start].name, "emit");
-    let names: Vec<&str> = body
-        .iter()
-        .map(|step| match step {
-            Step::Single { kernel } | Step::Indirect { kernel, .. } => plan.kernels[*kernel].name.as_str(),
-            _ => panic!("{step:?}"),
-        })
-        .collect();
-    let expected =
-        ["prepare_trace", "trace", "prepare_shade", "shade", "prepare_connection_stream", "resolve_connection"];
-    assert_eq!(names, expected);
-    for kernel in plan.kernels.iter().filter(|kernel| !kernel.name.starts_with("prepare")) {
+    assert!(matches!((begin, first), (Step::Single { .. }, Step::Dispatch { .. })));
+    assert_eq!(names(&plan, [begin, first]), ["begin", "emit"]);
+    let expected = ["prepare_trace", "trace", "prepare_shade", "resolve_connection", "shade"];
+    assert_eq!(names(&plan, body), expected);
+    assert_eq!(names(&plan, after), ["finish", "resolve_connection"]);
+    let single = |kernel: &crate::plan::Kernel| kernel.name.starts_with("prepare") || kernel.name == "finish";
+    for kernel in plan.kernels.iter().filter(|kernel| !single(kernel)) {
         let arguments = kernel.bindings.iter().any(|binding| plan.buffers[binding.buffer].role == Role::Arguments);
         assert!(!arguments, "{}", kernel.name);
     }
+}
+
+#[test]
+fn a_stream_is_emptied_when_what_waits_may_not_fit() {
+    let plan = generated(&[]).plan;
+    let prepare = &kernel(&plan, "prepare_shade").module;
+    let flush = "start_full_queue(STREAM_CONNECTION, connection_room(), waiting(QUEUE_SHADE))";
+    let (flush, start) = (prepare.find(flush).expect(prepare), prepare.find("start_queue(QUEUE_SHADE").expect(prepare));
+    assert!(flush < start, "what is about to start no longer waits");
+    assert!(!kernel(&plan, "prepare_trace").module.contains("STREAM_CONNECTION"));
+    assert!(kernel(&plan, "finish").module.contains("start_queue(STREAM_CONNECTION, connection_room())"));
+}
+
+/// Of the paths that wait when `relay` is about to run, those at `shade` push once in this round and those at `relay` twice; the
+/// two stages of which a path runs only one do not add up.
+#[test]
+fn the_bound_of_a_round_follows_the_routes() {
+    let routes = "shade = { on.scattered = \"trace\", on.absorbed = \"end\" }";
+    let split = "relay = { on.hit = \"shade\", on.miss = \"dim\" }\n\
+        dim = { entry = \"shade\", on.scattered = \"trace\", on.absorbed = \"end\" }\n";
+    let relay = "fn relay(eye: ptr<function, Walk>) -> u32 {\n    \
+        var connection: Connection;\n    connection.origin = eye.position;\n    push_connection(connection);\n    \
+        if eye.hit.t > 1.0 { return HIT; }\n    return MISS;\n}\n";
+    let pipeline =
+        PIPELINE.replace("on.hit = \"shade\"", "on.hit = \"relay\"").replace(routes, &format!("{split}{routes}"));
+    let result = crate::generate(&sources(&pipeline, LAYOUT, &format!("{STAGES}\n{relay}")), &selection(&[]));
+    let plan = result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan;
+    let prepare = &kernel(&plan, "prepare_relay").module;
+    let bound = "2u * waiting(QUEUE_RELAY) + waiting(QUEUE_DIM) + waiting(QUEUE_SHADE)";
+    assert!(prepare.contains(bound), "{prepare}");
+}
+
+#[test]
+fn a_pass_uses_as_many_slots_as_an_emptied_stream_can_serve() {
+    let plan_of = |capacity: &str| generated(&[("schedule.capacity", capacity)]).plan;
+    for (capacity, slots, bytes) in [("14", 1024, 392), ("1", 1024, 28), ("0.25", 256, 7), ("0.1", 102, 3)] {
+        let plan = plan_of(capacity);
+        let stream = plan.buffers.iter().find(|buffer| buffer.role == Role::Stream).unwrap();
+        assert_eq!((plan.slots_per_grain, stream.size.per_path), (slots, bytes), "{capacity}");
+    }
+    assert!(kernel(&plan_of("1"), "shade").module.contains("return path_count;"));
+    assert!(kernel(&plan_of("0.25"), "shade").module.contains("return path_count / 1024u * 256u;"));
+    assert_eq!(generated(&[("schedule.capacity", "0.25"), ("schedule.batch", "[]")]).plan.slots_per_grain, 1024);
+}
+
+#[test]
+fn a_stream_without_room_for_a_round_is_refused() {
+    let set = [("schedule.capacity", "0.0005")];
+    let refusal = crate::generate(&sources(PIPELINE, LAYOUT, STAGES), &selection(&set)).expect_err("no room");
+    let text = refusal.render(false);
+    assert_eq!(refusal.diagnostics[0].code, "K0222", "{text}");
+    assert!(text.contains("write a capacity of 0.001 or more"), "{text}");
 }
 
 #[test]
@@ -260,8 +314,8 @@ fn an_inline_stream_has_no_buffer() {
 fn a_batched_stream_keeps_what_its_consumer_reads() {
     let plan = generated(&[]).plan;
     let stream = plan.buffers.iter().find(|buffer| buffer.role == Role::Stream).unwrap();
-    // `origin` is read as a whole, `contribution` too, `pixel` is one word: 7 words, one record a path and round.
-    assert_eq!(stream.size.per_path, 28);
+    // `origin` is read as a whole, `contribution` too, `pixel` is one word: 7 words, four records a path.
+    assert_eq!(stream.size.per_path, 112);
 }
 
 #[test]

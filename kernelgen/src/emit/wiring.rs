@@ -1,6 +1,7 @@
 //! Stages and stream consumers as they are wired: found, linked, analysed, and checked against what the pipeline says.
 
 use super::entry::{Entries, Entry};
+use super::room;
 use super::signature::{Signature, signature};
 use crate::analyze::{self, Flow, FlowStage, Leaf, StageFacts};
 use crate::config::model::{RayKind, Stage, Stream, Variant};
@@ -8,6 +9,7 @@ use crate::config::nearest;
 use crate::diagnostic::Diagnostic;
 use crate::layout::StateLeaf;
 use crate::link::{self, Constant, Constants, Modules, Root};
+use crate::plan::SLOT_GRAIN;
 use crate::source::Sources;
 use indexmap::{IndexMap, IndexSet};
 use std::collections::{BTreeMap, BTreeSet};
@@ -54,8 +56,10 @@ pub(super) struct WiredStream {
     pub batched: bool,
     /// Leaves of the record that the consumer reads, in the order of the record.
     pub leaves: Vec<StateLeaf>,
-    /// Most records of a path between two runs of the consumer.
-    pub capacity: u32,
+    /// Most records that one run of a stage pushes, by stage; of a batched stream only.
+    pub pushes: IndexMap<String, u32>,
+    /// Most records of a path between two moments at which a batched stream may be emptied.
+    pub most: u32,
     pub rays: Option<RayKind>,
 }
 
@@ -82,7 +86,8 @@ impl Wiring {
 /// K0203 an outcome without a route, K0206 a parameter that is no instance, K0207 one of another record, K0208 a missing function,
 /// K0209 a stage that routes to itself, K0211 a consumer that asks for its path, K0212 a consumer that pushes, K0215 a function that
 /// is no stage, K0217 pushes to a batched stream in a loop, K0219 two parameters for one instance, K0220 an instance for a parameter
-/// that is not there, K0221 a consumer that takes something else than one record; K03xx of the stage texts.
+/// that is not there, K0221 a consumer that takes something else than one record, K0222 a batched
+/// stream without room for a round; K03xx of the stage texts.
 /// Warnings: K0204 an outcome that never comes, K0205 a stage that nothing reaches.
 pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Diagnostic>> {
     let mut wirer = Wirer {
@@ -312,25 +317,28 @@ impl Wirer<'_> {
         let analysed =
             self.analyse(entry, |entry, signature| check_consumer_signature(name, stream, entry, signature), &bind)?;
         check_consumer(name, stream, &analysed)?;
-        let capacity = if batched { self.capacity(name)? } else { 0 };
+        let pushes = if batched { self.pushes(name)? } else { IndexMap::new() };
+        let most = room::most(&self.wiring, &variant.pipeline.start.value, &pushes);
+        check_room(variant, name, stream, most)?;
         Ok(WiredStream {
             leaves: read_leaves(variant, name, stream, &analysed.facts),
             entry: analysed.entry,
             batched,
-            capacity,
+            pushes,
+            most,
             rays: stream.rays,
         })
     }
 
-    /// Most records of a path until the consumer runs: every stage once, and the start stage before the first round.
-    fn capacity(&self, stream: &str) -> Result<u32, Vec<Diagnostic>> {
+    /// Most records that one run of each stage pushes to a stream.
+    fn pushes(&self, stream: &str) -> Result<IndexMap<String, u32>, Vec<Diagnostic>> {
         let mut findings = Vec::new();
-        let mut capacity = 0;
-        let start = &self.variant.pipeline.start.value;
+        let mut most = IndexMap::new();
         for (name, stage) in &self.wiring.stages {
-            let runs = u32::from(self.wiring.is_looped(name)) + u32::from(name == start);
             match stage.facts.pushes.get(stream) {
-                Some(Some(pushes)) => capacity += pushes * runs,
+                Some(Some(pushes)) => {
+                    most.insert(name.clone(), *pushes);
+                }
                 Some(None) => {
                     let message = format!("stage `{name}` pushes to `{stream}` in a loop");
                     findings.push(
@@ -342,8 +350,27 @@ impl Wirer<'_> {
                 None => {}
             }
         }
-        if findings.is_empty() { Ok(capacity) } else { Err(findings) }
+        if findings.is_empty() { Ok(most) } else { Err(findings) }
     }
+}
+
+/// K0222: not even the fewest slots of a pass find room for the records of a round.
+fn check_room(variant: &Variant, name: &str, stream: &Stream, most: u32) -> Result<(), Vec<Diagnostic>> {
+    let schedule = &variant.schedule;
+    if room::records(schedule) >= most {
+        return Ok(());
+    }
+    let least = f64::from((1000 * most).div_ceil(SLOT_GRAIN)) / 1000.0;
+    let message = format!("stream `{name}` has no room for the records of a round");
+    Err(vec![
+        Diagnostic::error("K0222", message)
+            .at(
+                schedule.capacity.span,
+                format!("less than one record for {SLOT_GRAIN} path slots, or than a path needs"),
+            )
+            .also(stream.span, format!("a path pushes up to {most} of them in a round"))
+            .help(format!("write a capacity of {least} or more")),
+    ])
 }
 
 fn read_leaves(variant: &Variant, name: &str, stream: &Stream, facts: &StageFacts) -> Vec<StateLeaf> {
@@ -481,7 +508,7 @@ fn check_consumer_signature(name: &str, stream: &Stream, entry: &Entry, signatur
     findings
 }
 
-/// A consumer must do the same whether it runs on the spot or at the end of the round.
+/// A consumer must do the same whether it runs on the spot or when its stream is emptied.
 fn check_consumer(name: &str, stream: &Stream, analysed: &Analysed) -> Result<(), Vec<Diagnostic>> {
     let mut findings = Vec::new();
     if analysed.facts.globals.contains("path_id") {

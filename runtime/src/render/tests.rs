@@ -4,7 +4,7 @@ use super::*;
 use crate::device::DeviceOptions;
 use crate::film::Sums;
 use kernelgen::config::model::{Accumulate, RayKind};
-use kernelgen::plan::{Access, Binding, Buffer, Counter, Kernel, Needs, Size, Step};
+use kernelgen::plan::{Access, Binding, Buffer, Counter, Kernel, Needs, SLOT_GRAIN, Size, Step};
 
 const HEADER: &str = "
 override path_count: u32;
@@ -96,6 +96,7 @@ fn plan(film: Accumulate) -> Plan {
         tallies: Vec::new(),
         film,
         bytes_per_path: 4,
+        slots_per_grain: SLOT_GRAIN,
         needs: Needs { subgroup: false, int64_atomics: fixed, float32_atomics: !fixed },
     }
 }
@@ -128,6 +129,16 @@ fn every_sample_of_every_pixel_is_taken_once() {
             assert!((value[1] - pixel as f32).abs() < 1e-2);
         }
     }
+}
+
+#[test]
+fn a_pass_uses_no_more_slots_than_its_plan_allows() {
+    let plan = Plan { slots_per_grain: 100, ..plan(Accumulate::FixedI64) };
+    let session = Session::new(&gpu(), &plan, &nothing, settings(4096), Some(3)).expect("a session");
+    assert_eq!((session.slots, session.pass_limit), (400, 400));
+    let few = render(&gpu(), &plan, &nothing, settings(4096), 3).expect("a picture");
+    let all = Plan { slots_per_grain: SLOT_GRAIN, ..plan };
+    assert_eq!(few.totals.sums, render(&gpu(), &all, &nothing, settings(4096), 3).expect("a picture").totals.sums);
 }
 
 #[test]

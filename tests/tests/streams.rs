@@ -1,0 +1,49 @@
+//! How much room a batched stream has never changes the image: bit for bit with the fixed-point film.
+
+use tests::rendering::{Job, Rendering, shipped};
+
+/// One pass over all 2,048 slots, with paths so long that a stream with room for one record a slot must be emptied on the way.
+fn job(pipeline: &str) -> Job {
+    Job::of_file(shipped("cornell_box")).pipeline(pipeline).size(64, 32).samples(1).edges(8).fixed_point()
+}
+
+/// Both were rendered without overflow, which fails a render.
+#[track_caller]
+fn assert_same(rendering: &Rendering, expected: &Rendering, what: &str) {
+    assert!(rendering.sums == expected.sums, "{what}: another image");
+    assert_eq!(rendering.visibility, expected.visibility, "{what}: visibility rays");
+    assert_eq!(rendering.rays, expected.rays, "{what}: rays");
+    assert_eq!(rendering.rejected, 0, "{what}");
+}
+
+/// A tiny stream cuts the work into passes of few slots, a small one is emptied on the way, a large one after the last round.
+#[test]
+fn every_capacity_gives_the_bits_of_inline_visibility() {
+    for pipeline in ["pt", "lt"] {
+        let expected = job(pipeline).schedule("inline").render();
+        assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
+        assert!(expected.visibility > 2048, "{pipeline}: {} records fit into any stream", expected.visibility);
+        for capacity in ["0.02", "0.25", "1", "1.5", "2", "4", "14"] {
+            let rendering = job(pipeline).set("schedule.capacity", capacity).render();
+            assert_same(&rendering, &expected, &format!("{pipeline}, capacity {capacity}"));
+        }
+    }
+}
+
+/// Atomic queues order their records otherwise than subgroups do, and the capacity may come from either schedule.
+#[test]
+fn capacity_and_queue_kind_do_not_meet() {
+    let expected = job("pt").schedule("inline").render();
+    let atomic = job("pt").set("schedule.queue", "atomic").set("schedule.capacity", "1").render();
+    assert_same(&atomic, &expected, "atomic queues");
+    let batched = job("pt").schedule("inline").set("schedule.batch", "connection").render();
+    assert_same(&batched, &expected, "inline with a batched stream");
+}
+
+#[test]
+fn a_capacity_that_holds_nothing_is_refused() {
+    for (capacity, code) in [("0", "K0107"), ("-2", "K0107"), ("many", "K0106"), ("0.0001", "K0222")] {
+        let refusal = job("pt").set("schedule.capacity", capacity).check().expect_err("refused");
+        assert!(refusal.contains(code), "capacity {capacity}: {refusal}");
+    }
+}
