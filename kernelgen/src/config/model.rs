@@ -260,6 +260,8 @@ pub enum QueueKind {
     Atomic,
     /// One atomic a subgroup.
     Subgroup,
+    /// One atomic a workgroup; survivors keep their order in it.
+    Workgroup,
 }
 
 /// How the film adds.

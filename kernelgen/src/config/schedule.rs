@@ -22,7 +22,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let section = top.require("schedule", "write `[schedule]`", findings)?.section(findings)?;
     section.allow(&KEYS, findings);
     check_fixed(&section, findings);
-    let queue = word(&section, "queue", &["atomic", "subgroup"], findings);
+    let queue = word(&section, "queue", &["atomic", "subgroup", "workgroup"], findings);
     let workgroup = section.require("workgroup", "threads in a workgroup: `workgroup = 64`", findings);
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
@@ -32,7 +32,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     Some(Schedule {
         name: file.name.clone(),
         doc: file.doc.clone(),
-        queue: [QueueKind::Atomic, QueueKind::Subgroup][queue?],
+        queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup][queue?],
         workgroup: workgroup?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
         batch: batch.unwrap_or_default(),

@@ -128,7 +128,7 @@ fn enqueue(stage: &WiredStage, imports: &mut Imports) -> String {
         imports.add("outcome", outcomes.iter().map(String::as_str));
         imports.add("queue", [constant.as_str()]);
         let tests: Vec<String> = outcomes.iter().map(|outcome| format!("outcome == {outcome}")).collect();
-        let _ = writeln!(text, "    enqueue({constant}, {}, path_id);", tests.join(" || "));
+        let _ = writeln!(text, "    enqueue({constant}, {}, path_id, lane);", tests.join(" || "));
     }
     text
 }

@@ -116,10 +116,16 @@ pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
     for (stream, number) in queues.streams.iter().zip(queues.stages.len()..) {
         let _ = writeln!(text, "const {}: u32 = {number}u;", stream_constant(stream));
     }
+    let _ = writeln!(
+        text,
+        "\n/// Words with a bit for every invocation of a workgroup.\nconst WORKGROUP_WORDS: u32 = {}u;",
+        queues.workgroup.div_ceil(32)
+    );
     text.push_str(QUEUE);
     text.push_str(match kind {
         QueueKind::Atomic => ENQUEUE_ATOMIC,
         QueueKind::Subgroup => ENQUEUE_SUBGROUP,
+        QueueKind::Workgroup => ENQUEUE_WORKGROUP,
     });
     text.push_str(APPEND);
     let _ = write!(
@@ -141,7 +147,7 @@ var<storage, read_write> arguments: array<u32>;
 
 const ENQUEUE_ATOMIC: &str = r"
 /// Appends this path to a queue where `wanted`.
-fn enqueue(number: u32, wanted: bool, path: u32) {
+fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
     if wanted {
         let place = atomicAdd(&control[waiting_word(number)], 1u);
         queue[number * path_count + place] = path;
@@ -151,7 +157,7 @@ fn enqueue(number: u32, wanted: bool, path: u32) {
 
 const ENQUEUE_SUBGROUP: &str = r"
 /// Appends this path to a queue where `wanted`, with one atomic a subgroup. To be called by all invocations of a workgroup.
-fn enqueue(number: u32, wanted: bool, path: u32) {
+fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
     let ballot = countOneBits(subgroupBallot(wanted));
     let survivors = ballot.x + ballot.y + ballot.z + ballot.w;
     let rank = subgroupExclusiveAdd(select(0u, 1u, wanted));
@@ -163,6 +169,45 @@ fn enqueue(number: u32, wanted: bool, path: u32) {
     if wanted {
         queue[number * path_count + base + rank] = path;
     }
+}
+";
+
+const ENQUEUE_WORKGROUP: &str = r"
+/// One bit an invocation: which of them go on.
+var<workgroup> survivors: array<atomic<u32>, WORKGROUP_WORDS>;
+/// Where the survivors' places begin.
+var<workgroup> survivors_base: u32;
+
+/// Appends this path to a queue where `wanted`, with one atomic a workgroup; `lane` numbers its invocations. Neighbours stay
+/// neighbours, so later stages find their state side by side. To be called by all invocations of a workgroup.
+fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
+    if lane < WORKGROUP_WORDS {
+        atomicStore(&survivors[lane], 0u);
+    }
+    workgroupBarrier();
+    if wanted {
+        atomicOr(&survivors[lane / 32u], 1u << (lane % 32u));
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        var count = 0u;
+        for (var word = 0u; word < WORKGROUP_WORDS; word += 1u) {
+            count += countOneBits(atomicLoad(&survivors[word]));
+        }
+        survivors_base = 0u;
+        if count > 0u {
+            survivors_base = atomicAdd(&control[waiting_word(number)], count);
+        }
+    }
+    workgroupBarrier();
+    if wanted {
+        var place = survivors_base + countOneBits(atomicLoad(&survivors[lane / 32u]) & ((1u << (lane % 32u)) - 1u));
+        for (var word = 0u; word < lane / 32u; word += 1u) {
+            place += countOneBits(atomicLoad(&survivors[word]));
+        }
+        queue[number * path_count + place] = path;
+    }
+    workgroupBarrier();
 }
 ";
 
