@@ -8,6 +8,7 @@ pub mod error;
 pub mod execute;
 pub mod film;
 pub mod image_file;
+pub mod measurements;
 pub mod picture;
 pub mod profile;
 pub mod render;

@@ -1,6 +1,8 @@
 //! From linear radiance to a picture for the eye: exposure, sRGB, PNG.
 
 use crate::error::Error;
+use image::ImageEncoder;
+use image::codecs::png::PngEncoder;
 use std::path::Path;
 
 /// How bright a picture is shown.
@@ -56,17 +58,20 @@ fn encode(linear: f32) -> f32 {
 /// # Errors
 /// Failed, when the file cannot be written.
 pub fn write_png(path: &Path, size: [u32; 2], rgb: &[u8]) -> Result<(), Error> {
-    crate::image_file::replace(path, |temporary| {
-        image::save_buffer_with_format(
-            temporary,
-            rgb,
-            size[0],
-            size[1],
-            image::ColorType::Rgb8,
-            image::ImageFormat::Png,
-        )
-        .map_err(|error| error.to_string())
-    })
+    let bytes = png(size, rgb).map_err(|error| error.in_file(path))?;
+    crate::image_file::replace(path, |temporary| std::fs::write(temporary, &bytes).map_err(|error| error.to_string()))
+}
+
+/// The bytes of a PNG file of 8-bit RGB.
+///
+/// # Errors
+/// Failed, when the picture cannot be encoded.
+pub fn png(size: [u32; 2], rgb: &[u8]) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(rgb, size[0], size[1], image::ExtendedColorType::Rgb8)
+        .map_err(|error| Error::failed(format!("cannot encode the picture: {error}")))?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::execute::{Command, Counters};
 use indexmap::IndexMap;
 use kernelgen::config::model::RayKind;
 use kernelgen::plan::Plan;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The most queries one set may hold.
 const SET: usize = wgpu::QUERY_SET_MAX_QUERIES as usize;
@@ -80,7 +80,7 @@ impl Queries {
 }
 
 /// One number for each kind of ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ByKind {
     /// Of camera rays.
     pub primary: f64,

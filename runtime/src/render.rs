@@ -4,8 +4,10 @@ use crate::buffers::{Buffers, Resources, choose_path_count, usable_slots};
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::execute::{Counters, Executor, IN_FLIGHT, Pass};
-use crate::film::{Accumulator, Totals};
+use crate::film::{Accumulator, Sums, Totals};
+use crate::image_file::Image;
 use crate::profile::Profile;
+use crate::settings::RenderFile;
 use crate::tallies::{PILOT_SEED, PILOT_SLOTS, Tallies};
 use kernelgen::plan::{Plan, Role};
 use std::time::Instant;
@@ -74,6 +76,25 @@ pub struct Rendered {
     pub seconds: f64,
     /// Device times.
     pub profile: Profile,
+}
+
+impl Rendered {
+    /// The picture as a file holds it.
+    ///
+    /// # Errors
+    /// Failed, when the settings have no TOML form.
+    pub fn image(&self, metadata: &RenderFile, standard_errors: bool) -> Result<Image, Error> {
+        Ok(Image {
+            size: self.size,
+            radiance: self.mean.clone(),
+            standard_error: if standard_errors { self.standard_error.clone() } else { None },
+            fixed: match &self.totals.sums {
+                Sums::Fixed(units) => Some(units.clone()),
+                Sums::Float(_) => None,
+            },
+            settings: Some(metadata.to_toml()?),
+        })
+    }
 }
 
 /// A render in progress.

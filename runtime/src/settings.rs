@@ -1,13 +1,17 @@
 //! The settings of a render, as they stand in `configs/renders/*.toml` and in the metadata of a picture.
 
-use crate::configs::{Axis, Library};
+use crate::configs::{Axis, Library, with_scene};
 use crate::error::Error;
-use crate::scene::BuildPreset;
+use crate::render::{Rendered, Until};
+use crate::scene::{self, BuildPreset, LoadOptions, Scene};
 use crate::tallies::Tallied;
 use indexmap::IndexMap;
 use kernelgen::config::model::{Effects, Selection};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+/// The scene that is rendered when none is named.
+pub const DEFAULT_SCENE: &str = "cornell_box";
 
 /// Everything that fixes a picture; every key is optional.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -214,6 +218,49 @@ impl RenderFile {
             ..Self::default()
         }
         .overlaid(self)
+    }
+
+    /// Loads the scene, the default one when none is named.
+    ///
+    /// # Errors
+    /// User input, when the scene or its sky cannot be read.
+    pub fn load_scene(&self) -> Result<Scene, Error> {
+        let options = LoadOptions {
+            camera: self.camera.as_ref().map(Camera::word),
+            size: self.size.map(Into::into),
+            env: self.env.as_ref().map(Into::into),
+            env_scale: self.env_scale,
+            env_rotate_deg: self.env_rotate,
+            lens_radius: self.lens_radius.unwrap_or(0.0),
+            focus_distance: self.focus_distance,
+            build: self.build.unwrap_or_default(),
+            ..LoadOptions::default()
+        };
+        with_scene(self.scene.as_deref().unwrap_or(DEFAULT_SCENE), |path| scene::load(path, &options))
+    }
+
+    /// Whether the layers asked for hold standard errors.
+    ///
+    /// # Errors
+    /// User input, when there is no layer of a name.
+    pub fn wants_variance(&self) -> Result<bool, Error> {
+        match self.aov.iter().find(|layer| *layer != "variance") {
+            Some(other) => Err(Error::input(format!("--aov {other}: there is no such layer"))
+                .help("the one layer for now is `variance`")),
+            None => Ok(!self.aov.is_empty()),
+        }
+    }
+
+    /// The settings as they go into the metadata of the picture that they gave.
+    #[must_use]
+    pub fn of_rendered(&self, rendered: &Rendered, until: Until) -> Self {
+        let spp = match until {
+            Until::Samples(samples) => Some(samples),
+            Until::Seconds(_) | Until::Error(_) => None,
+        };
+        let totals = &rendered.totals;
+        let state = State { samples: totals.samples, batches: totals.batches, tallies: totals.tallied.clone() };
+        Self { spp, state: Some(state), ..self.clone() }
     }
 
     /// Resolves the axes to config keys; reads the user's own files into `library`.

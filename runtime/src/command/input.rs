@@ -6,16 +6,13 @@ use indexmap::IndexMap;
 use kernelgen::Generated;
 use kernelgen::config::model::{Effect, Effects, Selection};
 use kernelgen::source::Sources;
-use runtime::configs::{Axis, Library, is_path, with_scene};
+use runtime::configs::{Axis, Library, is_path};
 use runtime::device::{DeviceOptions, Gpu};
 use runtime::error::Error;
 use runtime::image_file::Image;
-use runtime::scene::{self, BuildPreset, LoadOptions, Scene};
-use runtime::settings::{Camera, RenderFile, SetValue};
+use runtime::scene::{BuildPreset, Scene};
+use runtime::settings::{Camera, DEFAULT_SCENE, RenderFile, SetValue};
 use std::path::Path;
-
-/// The scene that is rendered when none is named.
-const DEFAULT_SCENE: &str = "cornell_box";
 
 /// Which variant.
 #[derive(Clone, Debug, Default, Args)]
@@ -224,19 +221,7 @@ impl SceneArguments {
 /// # Errors
 /// User input, when the scene or its sky cannot be read.
 pub fn load_scene(settings: &RenderFile) -> Result<Scene, Error> {
-    let word = settings.scene.as_deref().unwrap_or(DEFAULT_SCENE);
-    let options = LoadOptions {
-        camera: settings.camera.as_ref().map(Camera::word),
-        size: settings.size.map(Into::into),
-        env: settings.env.as_ref().map(Into::into),
-        env_scale: settings.env_scale,
-        env_rotate_deg: settings.env_rotate,
-        lens_radius: settings.lens_radius.unwrap_or(0.0),
-        focus_distance: settings.focus_distance,
-        build: settings.build.unwrap_or_default(),
-        ..LoadOptions::default()
-    };
-    let scene = with_scene(word, |path| scene::load(path, &options))?;
+    let scene = settings.load_scene()?;
     scene.warnings.iter().for_each(|warning| warn(warning));
     Ok(scene)
 }

@@ -4,14 +4,12 @@ use super::input::{self, DeviceArguments, SceneArguments, VariantArguments};
 use super::summary::Summary;
 use super::{Failure, print, print_json, progress, say};
 use clap::Args;
-use kernelgen::plan::Plan;
 use runtime::error::Error;
-use runtime::film::Sums;
 use runtime::image_file::Image;
 use runtime::picture::{Exposure, to_srgb, write_png};
 use runtime::render::{Rendered, Session, Settings, Until};
 use runtime::scene::Accelerator;
-use runtime::settings::{RenderFile, State};
+use runtime::settings::RenderFile;
 use std::path::{Path, PathBuf};
 
 /// Samples per pixel when nothing says when to stop.
@@ -71,14 +69,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let earlier = arguments.resume.as_deref().map(input::of_picture).transpose()?;
     let mut settings = chosen(arguments, earlier.as_ref().map(|(settings, _)| settings))?;
-    let variance = wants_variance(&settings.aov)?;
+    let variance = settings.wants_variance()?;
     let until = until(arguments, &settings);
     let output = output(arguments, &settings)?;
 
     let mut scene = input::load_scene(&settings)?;
     let generated = input::generate_settings(&mut settings, scene.effects.clone())?;
     let gpu = arguments.device.open()?;
-    scene.set_accelerator(accelerator(&generated.plan))?;
+    scene.set_accelerator(Accelerator::of(&generated.plan))?;
     let size = scene.size().into();
     settings.size = Some(size);
     let seed = *settings.seed.get_or_insert(0);
@@ -101,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     result?;
 
     let rendered = session.picture()?;
-    let metadata = metadata(&settings, &rendered, until);
+    let metadata = settings.of_rendered(&rendered, until);
     let outputs = write(&output, &rendered, &metadata, variance, arguments.exposure)?;
     if progress::interrupted() {
         say(&format!(
@@ -124,22 +122,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         print(&summary.text()?)?
     }
     Ok(())
-}
-
-/// The hierarchy that the kernels read.
-fn accelerator(plan: &Plan) -> Accelerator {
-    let reads = |name: &str| plan.buffers.iter().any(|buffer| buffer.name == name);
-    if reads("bvh2_nodes") { Accelerator::Bvh2 } else { Accelerator::Cwbvh }
-}
-
-fn wants_variance(layers: &[String]) -> Result<bool, Error> {
-    match layers.iter().find(|layer| *layer != "variance") {
-        Some(other) => {
-            Err(Error::input(format!("--aov {other}: there is no such layer"))
-                .help("the one layer for now is `variance`"))
-        }
-        None => Ok(!layers.is_empty()),
-    }
 }
 
 fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>) -> Result<RenderFile, Error> {
@@ -213,19 +195,6 @@ fn resume(
     session.resume(&totals)
 }
 
-/// The settings as they go into the picture.
-fn metadata(settings: &RenderFile, rendered: &Rendered, until: Until) -> RenderFile {
-    let mut settings = settings.clone();
-    settings.spp = match until {
-        Until::Samples(samples) => Some(samples),
-        Until::Seconds(_) | Until::Error(_) => None,
-    };
-    let totals = &rendered.totals;
-    let tallies = totals.tallied.clone();
-    settings.state = Some(State { samples: totals.samples, batches: totals.batches, tallies });
-    settings
-}
-
 fn write(
     path: &Path,
     rendered: &Rendered,
@@ -233,20 +202,10 @@ fn write(
     errors: bool,
     exposure: Option<f64>,
 ) -> Result<Vec<PathBuf>, Error> {
-    let standard_error = if errors { rendered.standard_error.clone() } else { None };
-    if errors && standard_error.is_none() {
+    if errors && rendered.standard_error.is_none() {
         super::warn("one sample per pixel gives no standard errors: no `sem` layers are written");
     }
-    let image = Image {
-        size: rendered.size,
-        radiance: rendered.mean.clone(),
-        standard_error,
-        fixed: match &rendered.totals.sums {
-            Sums::Fixed(units) => Some(units.clone()),
-            Sums::Float(_) => None,
-        },
-        settings: Some(metadata.to_toml()?),
-    };
+    let image = rendered.image(metadata, errors)?;
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)
             .map_err(|error| Error::failed(format!("cannot make the folder: {error}")).in_file(folder))?;

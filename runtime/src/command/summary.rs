@@ -3,9 +3,10 @@
 use kernelgen::Generated;
 use runtime::device::Gpu;
 use runtime::error::Error;
+use runtime::measurements::Measurements;
 use runtime::render::Rendered;
 use runtime::settings::RenderFile;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -26,52 +27,19 @@ pub struct Summary<'a> {
 }
 
 impl Summary<'_> {
-    /// Samples of all pixels, taken by this run.
-    fn samples(&self) -> u64 {
-        let [width, height] = self.rendered.size;
-        u64::from(width) * u64::from(height) * u64::from(self.rendered.samples_taken)
-    }
-
-    fn msamples_per_second(&self) -> f64 {
-        self.samples() as f64 * 1e-6 / self.rendered.seconds.max(1e-9)
-    }
-
     /// One JSON object.
     ///
     /// # Errors
     /// Failed, when a number has no JSON form.
     pub fn json(&self) -> Result<Value, Error> {
-        let rendered = self.rendered;
-        let counters = &rendered.counters;
-        let failed = |error: serde_json::Error| Error::failed(format!("cannot write the results as JSON: {error}"));
-        let mut variant = self.settings.clone();
-        variant.state = None;
-        let mut object = json!({
-            "samples": self.samples(),
-            "samples_per_pixel": rendered.totals.samples,
-            "seconds": rendered.seconds,
-            "msamples_per_s": self.msamples_per_second(),
-            "rays": {
-                "primary": counters.primary,
-                "secondary": counters.secondary,
-                "deep": counters.deep,
-                "visibility": counters.visibility,
-            },
-            "bytes_per_path": self.generated.plan.bytes_per_path,
-            "mrays_per_s": serde_json::to_value(rendered.profile.mrays_per_second(counters, rendered.seconds)).map_err(failed)?,
-            "rejected": counters.rejected,
-            "adapter": self.gpu.info.name,
-            "outputs": self.outputs.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
-            "variant": serde_json::to_value(&variant).map_err(failed)?,
-        });
-        let relative = rendered.totals.relative_error();
-        if relative.is_finite() {
-            object["relative_error"] = json!(relative);
-        }
-        if rendered.profile.passes > 0 {
-            object["ms_per_pass"] = json!(rendered.profile.kernel_milliseconds());
-        }
+        let mut object = serde_json::to_value(self.measurements())
+            .map_err(|error| Error::failed(format!("cannot write the results as JSON: {error}")))?;
+        object["outputs"] = self.outputs.iter().map(|path| path.display().to_string()).collect();
         Ok(object)
+    }
+
+    fn measurements(&self) -> Measurements {
+        Measurements::of(self.rendered, self.generated, self.gpu, self.settings)
     }
 
     /// Lines for people.
@@ -93,7 +61,7 @@ impl Summary<'_> {
             out,
             "time          {:.2} s, {:.2} Msamples/s on {}",
             rendered.seconds,
-            self.msamples_per_second(),
+            self.measurements().msamples_per_s,
             self.gpu.info.name
         )?;
         let rates = rendered.profile.mrays_per_second(counters, rendered.seconds);

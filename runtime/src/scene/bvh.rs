@@ -1,6 +1,7 @@
 //! Bounding volume hierarchies over the triangles, built by obvhs and packed as the kernels read them.
 
 use glam::Vec3A;
+use kernelgen::plan::Plan;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::leaf_collapser::collapse;
@@ -27,6 +28,12 @@ pub enum Accelerator {
 }
 
 impl Accelerator {
+    /// The hierarchy that the kernels of a plan read.
+    pub fn of(plan: &Plan) -> Self {
+        let reads = |name: &str| plan.buffers.iter().any(|buffer| buffer.name == name);
+        if reads("bvh2_nodes") { Accelerator::Bvh2 } else { Accelerator::Cwbvh }
+    }
+
     /// The deepest hierarchy that the kernels can traverse: on the way down they put by one entry a level.
     pub fn most_levels(self) -> usize {
         match self {
