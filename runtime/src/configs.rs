@@ -26,6 +26,8 @@ pub enum Axis {
     Precision,
     /// All of them, a scene and the settings of a picture.
     Render,
+    /// Several renders that are compared.
+    Study,
 }
 
 impl Axis {
@@ -40,6 +42,7 @@ impl Axis {
             Axis::Schedule => "schedules",
             Axis::Precision => "precisions",
             Axis::Render => "renders",
+            Axis::Study => "studies",
         }
     }
 
@@ -51,10 +54,11 @@ impl Axis {
             Axis::Schedule => "schedule",
             Axis::Precision => "precision",
             Axis::Render => "render",
+            Axis::Study => "study",
         }
     }
 
-    /// Names of the shipped files, sorted.
+    /// Names of the shipped files, sorted; one in a folder below carries the folder's name, `folder/name`.
     pub fn names(self) -> Vec<&'static str> {
         let prefix = format!("{}/", self.folder());
         CONFIGS.iter().filter_map(|(key, _)| key.strip_prefix(prefix.as_str())?.strip_suffix(".toml")).collect()
@@ -186,7 +190,8 @@ pub fn is_path(word: &str) -> bool {
         || Path::new(word).extension().is_some_and(|extension| extension == "toml")
 }
 
-fn unknown(axis: Axis, word: &str) -> Error {
+/// The error about a word that names no shipped file of an axis.
+pub fn unknown(axis: Axis, word: &str) -> Error {
     let names = axis.names();
     let error = Error::input(format!("there is no {} named `{word}`", axis.word()));
     match kernelgen::config::nearest(word, names.iter().copied()) {

@@ -14,4 +14,5 @@ pub mod profile;
 pub mod render;
 pub mod scene;
 pub mod settings;
+pub mod study;
 pub mod tallies;

@@ -223,6 +223,20 @@ fn emitted_folder_that_is_a_file() {
 }
 
 #[test]
+fn studies() {
+    refused("study", &["study", "layuots"], &["there is no study named `layuots`"]);
+    refused("study_file", &["study", "seed/darkk"], &["seed/darkk: cannot read the study", "help: ", "seed/dark"]);
+    let folder = Folder::new("study_text");
+    folder.write(
+        "mine.toml",
+        b"title = \"Mine\"\n[[variant]]\nname = \"a\"\nsp = 4\n[[scene]]\nname = \"cornell_box\"\n",
+    );
+    folder.refused(INPUT, &["study", "mine.toml"], &["mine.toml", "line 2", "unknown field `sp`"]);
+    folder.write("taken", b"a file");
+    folder.refused(INPUT, &["study", "seed/dark", "-o", "taken/out"], &["`taken` is not a folder"]);
+}
+
+#[test]
 fn compared_pictures_of_two_sizes() {
     let folder = Folder::new("sizes");
     folder.picture("a.exr", [4, 2]);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Which file of each axis to combine, and what to override.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     /// Config key of the pipeline, `pipelines/pt.toml`.
     pub pipeline: String,

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use runtime::configs::{Axis, Library};
 use runtime::error::Error;
 use runtime::settings::RenderFile;
+use runtime::study::Study;
 use serde_json::json;
 use std::path::Path;
 
@@ -82,7 +83,8 @@ impl Case {
         let selection = &self.selection;
         let axes =
             [&selection.pipeline, &selection.layout, &selection.schedule, &selection.precision].map(|key| stem(key));
-        format!("{} ({})", axes.join(" x "), self.scene)
+        let set: String = selection.set.iter().map(|(key, value)| format!(", {key}={value}")).collect();
+        format!("{}{set} ({})", axes.join(" x "), self.scene)
     }
 }
 
@@ -140,6 +142,9 @@ fn cases(library: &mut Library, files: &[String], scenes: &[(&'static str, Effec
             let text = Axis::Render.shipped(name).unwrap_or_default();
             all.push(render(library, RenderFile::parse(text, &format!("configs/renders/{name}.toml"))?)?);
         }
+        for name in Axis::Study.names() {
+            all.extend(study(library, &Study::load(name)?)?);
+        }
         all
     } else {
         let mut all = Vec::new();
@@ -171,6 +176,9 @@ fn of_file(library: &mut Library, file: &str) -> Result<Vec<Selection>, Error> {
     }
     // A bare `my.toml` is a file here, never a name.
     let word = if file.contains('/') { file.to_owned() } else { format!("./{file}") };
+    if axis == Axis::Study {
+        return study(library, &Study::load(&word)?);
+    }
     let key = library.resolve(axis, &word)?;
     Ok(product(library, Some((axis, key))))
 }
@@ -182,11 +190,28 @@ fn axis_of(path: &Path, text: &str) -> Axis {
     if table.get("pipeline").is_some_and(toml::Value::is_str) {
         return Axis::Render;
     }
+    if table.get("variant").is_some_and(toml::Value::is_array) {
+        return Axis::Study;
+    }
     if let Some((_, axis)) = by_table.iter().find(|(key, _)| table.get(*key).is_some_and(toml::Value::is_table)) {
         return *axis;
     }
     let folder = path.parent().and_then(Path::file_name).unwrap_or_default();
     Axis::VARIANT.into_iter().find(|axis| folder == axis.folder()).unwrap_or(Axis::Pipeline)
+}
+
+/// What a study renders, once each.
+fn study(library: &mut Library, study: &Study) -> Result<Vec<Selection>, Error> {
+    let mut all = Vec::new();
+    for scene in &study.scenes {
+        for variant in &study.variants {
+            let selection = study.wanted(variant, scene, 0)?.settings.selection(library, Effects::new())?;
+            if !all.contains(&selection) {
+                all.push(selection);
+            }
+        }
+    }
+    Ok(all)
 }
 
 fn render(library: &mut Library, settings: RenderFile) -> Result<Selection, Error> {

@@ -8,6 +8,7 @@ mod info;
 mod input;
 mod progress;
 mod render;
+mod study;
 mod summary;
 
 use clap::{Parser, Subcommand};
@@ -33,6 +34,8 @@ enum Command {
     Explain(explain::Arguments),
     /// Generates and validates every config, or the named ones; needs no GPU
     Check(check::Arguments),
+    /// Renders every variant of a study on every scene, and reports what they cost and how far off they are
+    Study(study::Arguments),
     /// Measures how far two images are apart
     Compare(compare::Arguments),
     /// Lists adapters with limits and features, or what is in a scene
@@ -61,6 +64,7 @@ pub fn main() -> ExitCode {
         Command::Emit(arguments) => emit::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };

@@ -1,6 +1,6 @@
 //! Measures of the difference of two images.
 
-use super::Image;
+use super::{Image, blocks};
 use crate::picture::{Exposure, to_srgb};
 use serde::Serialize;
 
@@ -30,6 +30,31 @@ pub fn metrics(image: &Image, reference: &Image) -> Metrics {
         flip: f64::from(nv_flip::FlipPool::from_image(&flip(image, reference)).mean()),
         mean_ratio: [0, 1, 2].map(|channel| mean_ratio(image, reference, channel)),
     }
+}
+
+/// Mean over the blocks of `side` x `side` pixels, and over channels, of the squared difference of the block's means: what is left
+/// of the error when noise that pixels do not share averages out.
+pub fn block_mse(image: &Image, reference: &Image, side: u32) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0_f64);
+    for (corner, end) in blocks(image.size, side) {
+        for channel in 0..3 {
+            sum += block_difference(image, reference, corner, end, channel).powi(2);
+            count += 1.0;
+        }
+    }
+    sum / count.max(1.0)
+}
+
+fn block_difference(image: &Image, reference: &Image, corner: [u32; 2], end: [u32; 2], channel: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in corner[1]..end[1] {
+        for x in corner[0]..end[0] {
+            let at = (y as usize * image.size[0] as usize + x as usize) * 3 + channel;
+            sum += f64::from(image.radiance[at]) - f64::from(reference.radiance[at]);
+            count += 1.0;
+        }
+    }
+    sum / count
 }
 
 /// FLIP's picture of the difference: 8-bit RGB, dark where nothing differs.
@@ -65,6 +90,16 @@ mod tests {
         let same = metrics(&flat(0.5), &flat(0.5));
         assert_eq!((same.mse, same.relmse, same.flip), (0.0, 0.0, 0.0));
         assert_eq!(same.mean_ratio, [Some(1.0); 3]);
+    }
+
+    #[test]
+    fn noise_averages_out_in_blocks() {
+        let mut noisy = flat(0.5);
+        for pixel in noisy.radiance.chunks_exact_mut(6) {
+            pixel.copy_from_slice(&[0.25, 0.25, 0.25, 0.75, 0.75, 0.75]);
+        }
+        assert_eq!((block_mse(&noisy, &flat(0.5), 8), block_mse(&noisy, &flat(0.5), 1)), (0.0, 0.0625));
+        assert_eq!(block_mse(&flat(1.0), &flat(0.5), 7), 0.25);
     }
 
     #[test]

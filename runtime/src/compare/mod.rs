@@ -27,6 +27,18 @@ pub fn check(first: (&str, &Image), second: (&str, &Image)) -> Result<(), Error>
     finite(name_b, b)
 }
 
+/// First corner and end (beyond the last column and row) of all blocks of `side` x `side` pixels; those at the right and lower edge are smaller.
+fn blocks(size: [u32; 2], side: u32) -> impl Iterator<Item = ([u32; 2], [u32; 2])> {
+    let [width, height] = size;
+    let side = side.max(1);
+    (0..height).step_by(side as usize).flat_map(move |y| {
+        (0..width).step_by(side as usize).map(move |x| {
+            let end = [x.saturating_add(side).min(width), y.saturating_add(side).min(height)];
+            ([x, y], end)
+        })
+    })
+}
+
 fn finite(name: &str, image: &Image) -> Result<(), Error> {
     let bad = |value: &f32| !value.is_finite();
     let Some(first) = image.radiance.iter().position(bad) else { return Ok(()) };

@@ -1,6 +1,6 @@
 //! Whether two images differ by more than their own noise: z-scores of block means.
 
-use super::Image;
+use super::{Image, blocks};
 
 /// Relative rounding that a converged f32 image may have, about 2^-20; keeps noiseless blocks from infinite scores.
 const ROUNDING: f64 = 1e-6;
@@ -26,19 +26,10 @@ pub fn block_z(a: &Image, b: &Image, block: u32) -> Option<Vec<BlockZ>> {
     if a.standard_error.is_none() && b.standard_error.is_none() {
         return None;
     }
-    let block = block.max(1);
-    let [width, height] = a.size;
-    let mut scores = Vec::new();
-    for y in (0..height).step_by(block as usize) {
-        for x in (0..width).step_by(block as usize) {
-            for channel in 0..3 {
-                let corner = [x, y];
-                let end = [x.saturating_add(block).min(width), y.saturating_add(block).min(height)];
-                scores.push(BlockZ { x, y, channel, z: score(a, b, corner, end, channel) });
-            }
-        }
-    }
-    Some(scores)
+    let of_block = |(corner, end): ([u32; 2], [u32; 2])| {
+        [0, 1, 2].map(|channel| BlockZ { x: corner[0], y: corner[1], channel, z: score(a, b, corner, end, channel) })
+    };
+    Some(blocks(a.size, block).flat_map(of_block).collect())
 }
 
 /// The largest absolute score.

@@ -1,0 +1,11 @@
+//! Studies: every variant on every scene, what each costs and how far off it is, as numbers and as one page.
+
+pub mod chart;
+pub mod file;
+pub mod report;
+pub mod results;
+pub mod run;
+
+pub use file::Study;
+pub use results::Results;
+pub use run::{Observer, Outcome, run};

@@ -1,0 +1,276 @@
+//! Studies: what a small one writes, what it does not render twice, and that every shipped one can be run.
+
+use kernelgen::config::model::Effects;
+use runtime::configs::{Axis, Library};
+use runtime::device::{DeviceOptions, Gpu};
+use runtime::error::Error;
+use runtime::image_file::Image;
+use runtime::render::Progress;
+use runtime::settings::RenderFile;
+use runtime::study::{Observer, Outcome, Results, Study, run};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+/// Two pipelines on two shipped scenes, and a scene that is not there.
+const SMALL: &str = r#"
+title = "Small & quick"
+doc   = "Two variants on two scenes."
+
+[defaults]
+size = [16, 16]
+spp  = 2
+
+[[variant]]
+name     = "pt <b>"
+pipeline = "pt"
+doc      = "Path tracing."
+
+[[variant]]
+name     = "nee"
+pipeline = "nee"
+
+[[scene]]
+name              = "cornell_box"
+reference_variant = "pt <b>"
+reference_spp     = 8
+
+[[scene]]
+name = "slit_room"
+set  = { max_edges = 3 }
+
+[[scene]]
+name  = "gone"
+scene = "no/such/scene.glb"
+"#;
+
+/// One study at a time: renders use all cores of a software device anyway.
+static GPU: LazyLock<Mutex<Gpu>> = LazyLock::new(|| {
+    Mutex::new(Gpu::open(&DeviceOptions::default()).expect("there is a Vulkan device, if only Mesa's software driver"))
+});
+
+/// A folder for a study, removed at the end of its test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str) -> Folder {
+        Folder(std::env::temp_dir().join(format!("pathloom-study-{}-{test}", std::process::id())))
+    }
+
+    fn text(&self, name: &str) -> String {
+        fs::read_to_string(self.0.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder that stays behind in the temporary one does no harm.
+        drop(fs::remove_dir_all(&self.0));
+    }
+}
+
+/// Remembers what a study says, and stops it after some renders.
+#[derive(Default)]
+struct Listener {
+    begun: Vec<String>,
+    notes: Vec<String>,
+    stop_after: Option<usize>,
+}
+
+impl Observer for Listener {
+    fn begin(&mut self, what: &str) -> bool {
+        self.begun.push(what.to_owned());
+        self.stop_after.is_none_or(|most| self.begun.len() <= most)
+    }
+
+    fn show(&mut self, _: &Progress) -> bool {
+        true
+    }
+
+    fn end(&mut self) {}
+
+    fn note(&mut self, line: &str) {
+        self.notes.push(line.to_owned());
+    }
+}
+
+fn run_in(folder: &Path, text: &str, listener: &mut Listener) -> Result<Outcome, Error> {
+    let study = Study::parse(text, "small.toml")?;
+    let gpu = GPU.lock().unwrap_or_else(PoisonError::into_inner);
+    run(&study, folder, &gpu, listener)
+}
+
+#[track_caller]
+fn run_small(folder: &Folder, text: &str) -> (Outcome, Listener) {
+    let mut listener = Listener::default();
+    let outcome = run_in(&folder.0, text, &mut listener).unwrap_or_else(|error| panic!("{error}"));
+    (outcome, listener)
+}
+
+/// Opening and closing tags in order, void elements and the contents of `<style>` left out.
+#[track_caller]
+fn assert_balanced(html: &str) {
+    let mut open: Vec<&str> = Vec::new();
+    for tag in html.split('<').skip(1).filter_map(|rest| rest.split('>').next()) {
+        let name = tag.trim_start_matches('/').split_whitespace().next().unwrap_or("").trim_end_matches('/');
+        if tag.starts_with('/') {
+            assert_eq!(open.pop(), Some(name), "`</{name}>` closes something else");
+        } else if !(tag.ends_with('/') || tag.starts_with('!') || ["img", "meta"].contains(&name)) {
+            open.push(name);
+        }
+    }
+    assert!(open.is_empty(), "left open: {open:?}");
+}
+
+#[test]
+fn a_small_study_writes_everything_and_renders_nothing_twice() {
+    let folder = Folder::new("small");
+    let (first, listener) = run_small(&folder, SMALL);
+    assert_eq!(
+        (first.rendered, first.results.runs.len(), first.stopped),
+        (5, 4, false),
+        "four pictures and a reference"
+    );
+    assert!(listener.notes.iter().any(|note| note.contains("`gone` is skipped")), "{:?}", listener.notes);
+    assert_tables(&folder, &first.results);
+    assert_pictures(&folder, &first.results);
+    assert_report(&folder.text("report.html"));
+
+    let (second, listener) = run_small(&folder, SMALL);
+    assert_eq!((second.rendered, listener.begun.len()), (0, 0));
+    assert_eq!(second.results, first.results);
+
+    let (third, listener) = run_small(&folder, &SMALL.replace("max_edges = 3", "max_edges = 4"));
+    assert_eq!(third.rendered, 2, "one scene has other settings: {:?}", listener.begun);
+}
+
+#[track_caller]
+fn assert_tables(folder: &Folder, results: &Results) {
+    let csv = folder.text("results.csv");
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines.len(), 1 + 4, "a row of names and one for each picture");
+    assert!(lines[0].starts_with("scene,variant,repeat,pipeline,"));
+    let cells = |line: &str| line.split('"').step_by(2).collect::<String>().split(',').count();
+    assert!(lines.iter().all(|line| cells(line) == cells(lines[0])), "{csv}");
+    let read = Results::read(&folder.0).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(&read, results);
+    for run in &results.runs {
+        assert_eq!((run.measured.samples, run.measured.rejected), (16 * 16 * 2, 0));
+        assert_eq!(run.errors.is_some(), run.scene == "cornell_box", "only one scene has a reference");
+    }
+}
+
+#[track_caller]
+fn assert_pictures(folder: &Folder, results: &Results) {
+    for run in &results.runs {
+        let path = folder.0.join(&run.picture);
+        let image = Image::load(&path).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(image.size, [16, 16]);
+        let settings = image.settings.map(|text| RenderFile::parse(&text, "metadata"));
+        assert!(settings.is_some_and(|settings| settings.is_ok()), "the picture can be rendered again");
+        assert!(path.with_extension("png").is_file());
+        assert_eq!(path.with_extension("difference.png").is_file(), run.errors.is_some());
+    }
+}
+
+#[track_caller]
+fn assert_report(html: &str) {
+    for words in ["Small &amp; quick", "pt &lt;b&gt;", "nee", "cornell_box", "slit_room", "gone", "Path tracing."] {
+        assert!(html.contains(words), "`{words}` is not in the report");
+    }
+    assert!(!html.contains("<b>"), "names are escaped");
+    for outside in ["http://", "https://", "src=\"pictures"] {
+        assert!(!html.contains(outside), "the report needs nothing beside it");
+    }
+    assert!(html.contains("<svg") && html.contains("data:image/png;base64,"));
+    assert_balanced(html);
+}
+
+#[test]
+fn a_stopped_study_goes_on() {
+    let folder = Folder::new("stopped");
+    let mut listener = Listener { stop_after: Some(2), ..Listener::default() };
+    let stopped = run_in(&folder.0, SMALL, &mut listener).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!((stopped.stopped, stopped.rendered, stopped.results.runs.len()), (true, 2, 1));
+    let (rest, _) = run_small(&folder, SMALL);
+    assert_eq!((rest.stopped, rest.rendered, rest.results.runs.len()), (false, 3, 4));
+}
+
+#[test]
+fn repetitions_have_seeds_of_their_own() {
+    let folder = Folder::new("repeat");
+    let (outcome, _) = run_small(&folder, &SMALL.replace("[defaults]", "repeat = 2\n[defaults]"));
+    let runs = outcome.results.of("slit_room", "nee");
+    assert_eq!(runs.len(), 2);
+    assert_ne!(runs[0].mean, runs[1].mean);
+    assert_ne!(runs[0].picture, runs[1].picture);
+    assert!(folder.text("report.html").contains(" ± "));
+}
+
+#[track_caller]
+fn refused(test: &str, text: &str, words: &[&str]) {
+    let folder = Folder::new(test);
+    let error = run_in(&folder.0, text, &mut Listener::default()).expect_err("the study is refused");
+    let said = error.to_string();
+    assert_eq!(error.exit_code(), 2, "{said}");
+    words.iter().for_each(|word| assert!(said.contains(word), "`{word}` is not in: {said}"));
+}
+
+#[test]
+fn broken_studies_are_refused() {
+    refused("key", &SMALL.replace("spp  = 2", "sp = 2"), &["small.toml", "unknown field `sp`"]);
+    refused(
+        "pipeline",
+        &SMALL.replace("\"nee\"\npipeline = \"nee\"", "\"nee\"\npipeline = \"ne\""),
+        &["no pipeline named `ne`"],
+    );
+    refused("reference", &SMALL.replace("= \"pt <b>\"\nreference", "= \"ptt\"\nreference"), &["no variant `ptt`"]);
+    refused("set", &SMALL.replace("max_edges = 3", "max_egdes = 3"), &["K0110", "max_egdes", "slit_room"]);
+    refused("layer", &SMALL.replace("spp  = 2", "spp = 2\naov = [\"normals\"]"), &["normals", "`variance`"]);
+    refused("scene", &SMALL.replace("\"slit_room\"", "\"slit_rom\""), &["there is no scene `slit_rom`"]);
+}
+
+#[test]
+fn results_of_something_else_are_not_overwritten() {
+    let folder = Folder::new("other");
+    fs::create_dir_all(&folder.0).expect("the temporary folder is writable");
+    fs::write(folder.0.join("results.json"), "[1, 2]").expect("the temporary folder is writable");
+    let error = run_in(&folder.0, SMALL, &mut Listener::default()).expect_err("the folder is taken");
+    assert_eq!((error.exit_code(), folder.text("results.json").as_str()), (2, "[1, 2]"));
+}
+
+/// Every effect that a scene may call for.
+fn effects() -> Effects {
+    let mut effects = RenderFile::default().load_scene().expect("the Cornell box is shipped").effects;
+    effects.values_mut().for_each(|effect| effect.present = true);
+    effects
+}
+
+#[test]
+fn every_shipped_study_parses_and_its_variants_generate() {
+    let effects = effects();
+    assert!(!Axis::Study.names().is_empty(), "studies are shipped");
+    let mut broken = Vec::new();
+    for name in Axis::Study.names() {
+        if let Err(error) = generate(name, &effects) {
+            broken.push(format!("{name}: {error}"));
+        }
+    }
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+fn generate(name: &str, effects: &Effects) -> Result<(), String> {
+    let study = Study::load(name).map_err(|error| error.to_string())?;
+    for scene in &study.scenes {
+        study.against(scene).map_err(|error| error.to_string())?;
+        for variant in &study.variants {
+            let wanted = study.wanted(variant, scene, 0).map_err(|error| error.to_string())?;
+            let mut library = Library::default();
+            let selection =
+                wanted.settings.selection(&mut library, effects.clone()).map_err(|error| error.to_string())?;
+            kernelgen::generate(&library.sources, &selection)
+                .map_err(|refusal| format!("variant `{}`: {}", variant.name, refusal.render(false)))?;
+        }
+    }
+    Ok(())
+}
