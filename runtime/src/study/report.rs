@@ -145,8 +145,8 @@ const MEASURES: &[Measure] = &[
         chart: None,
     },
     Measure {
-        title: "Rejected contributions",
-        unit: "1",
+        title: "Rejected",
+        unit: "contributions",
         doc: "Not finite or negative; must be 0.",
         value: |run| Some(run.measured.rejected as f64),
         chart: None,
@@ -210,7 +210,10 @@ fn notes(results: &Results) -> String {
     let adapters: BTreeSet<&str> = results.runs.iter().map(|run| run.measured.adapter.as_str()).collect();
     let several = if adapters.len() > 1 { "; times of different adapters cannot be compared" } else { "" };
     let names: Vec<&str> = adapters.into_iter().collect();
-    let mut lines = vec![format!("{} pictures, rendered on {}{several}.", results.runs.len(), names.join(" and "))];
+    let mut lines = vec![match names.as_slice() {
+        [] => "Nothing was rendered.".to_owned(),
+        names => format!("{} pictures, rendered on {}{several}.", results.runs.len(), names.join(" and ")),
+    }];
     lines.extend(
         results.skipped.iter().map(|skipped| format!("Scene {} was skipped: {}.", skipped.scene, skipped.reason)),
     );
