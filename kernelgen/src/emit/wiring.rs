@@ -356,19 +356,17 @@ impl Wirer<'_> {
 
 /// K0222: not even the fewest slots of a pass find room for the records of a round.
 fn check_room(variant: &Variant, name: &str, stream: &Stream, most: u32) -> Result<(), Vec<Diagnostic>> {
-    let schedule = &variant.schedule;
-    if room::records(schedule) >= most {
+    let capacity = &variant.schedule.capacity;
+    let records = room::records(&variant.schedule);
+    if records >= most {
         return Ok(());
     }
     let least = f64::from((1000 * most).div_ceil(SLOT_GRAIN)) / 1000.0;
     let message = format!("stream `{name}` has no room for the records of a round");
     Err(vec![
         Diagnostic::error("K0222", message)
-            .at(
-                schedule.capacity.span,
-                format!("less than one record for {SLOT_GRAIN} path slots, or than a path needs"),
-            )
-            .also(stream.span, format!("a path pushes up to {most} of them in a round"))
+            .at(capacity.span, format!("room for {records} in {SLOT_GRAIN} path slots"))
+            .also(stream.span, format!("one path can push {most} in a round"))
             .help(format!("write a capacity of {least} or more")),
     ])
 }
