@@ -100,7 +100,7 @@ impl Image {
             // One batch does not deviate from itself.
             None => (batches <= 1).then(|| vec![0.0; self.radiance.len()]),
         };
-        Totals { samples, batches, sums, spread, tallied: None }
+        Totals { samples, batches, sums, spread, shares: vec![1.0], tallied: None }
     }
 }
 
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn standard_errors_survive_totals() {
         let (sums, spread) = (Sums::Float(vec![6.4; 3]), Some(vec![2.0; 3]));
-        let totals = Totals { samples: 64, batches: 8, sums, spread, tallied: None };
+        let totals = Totals { samples: 64, batches: 8, sums, spread, shares: vec![1.0], tallied: None };
         let image = Image {
             size: [1, 1],
             radiance: totals.mean(),

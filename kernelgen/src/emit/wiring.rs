@@ -35,6 +35,8 @@ pub(super) struct Wiring {
     pub warnings: Vec<Diagnostic>,
     /// Effects that a stage asks for: `HAS_SKY`.
     pub effects_seen: BTreeSet<String>,
+    /// Functions of the module `film` that a stage or a consumer calls.
+    pub splats: BTreeSet<String>,
 }
 
 /// A stage.
@@ -243,6 +245,8 @@ impl Wirer<'_> {
         let facts = analyze::stage_facts(&module, &linked, &entry.name, bind, &outcomes.collect())?;
         let pruned = linked.constants_seen.iter().any(|name| self.is_absent(name));
         self.wiring.effects_seen.extend(linked.constants_seen);
+        let of_film = linked.items.into_iter().filter(|(module, _)| module == "film");
+        self.wiring.splats.extend(of_film.map(|(_, item)| item));
         Ok(Analysed { entry, signature, facts, pruned })
     }
 

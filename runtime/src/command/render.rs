@@ -242,8 +242,8 @@ fn write(
         radiance: rendered.mean.clone(),
         standard_error,
         fixed: match &rendered.totals.sums {
-            Sums::Fixed(units) => Some(units.clone()),
-            Sums::Float(_) => None,
+            Sums::Fixed(units) if rendered.layers.is_empty() => Some(units.clone()),
+            Sums::Fixed(_) | Sums::Float(_) => None,
         },
         settings: Some(metadata.to_toml()?),
     };
