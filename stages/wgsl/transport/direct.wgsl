@@ -2,6 +2,7 @@
 
 import package::real::{real, vec3r};
 import package::state::{Connection, Walk};
+import package::params::record_strategies;
 import package::features::HAS_ATTENUATION;
 import package::pass::path_pixel;
 import package::random::{DIMENSION_LIGHT, WALK_EYE, random4};
@@ -11,6 +12,7 @@ import package::surface::spawn::Segment;
 import package::light::light::sample_light;
 import package::light::light_sample::LightSample;
 import package::transport::dimension::random_extra;
+import package::transport::record::strategy_index;
 import package::transport::medium::{medium_after, transmittance};
 
 /// Draws the light for next-event estimation at surface vertex `vertex` of the eye walk.
@@ -37,6 +39,32 @@ fn offer(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribu
 fn offer_particle(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) {
     if any(contribution != vec3r(0.0)) {
         push_particle(connection_of(walk, surface, segment, contribution, pixel));
+    }
+}
+
+/// As `offer`, for a strategy (s, t) of several; `unweighted` is what it would contribute alone.
+fn offer_strategy(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, unweighted: vec3r, s: u32, t: u32) {
+    if any(contribution != vec3r(0.0)) {
+        var connection = connection_of(walk, surface, segment, contribution, path_pixel());
+        if record_strategies {
+            let attenuated = connection_of(walk, surface, segment, unweighted, path_pixel());
+            connection.unweighted = attenuated.contribution;
+            connection.strategy = strategy_index(s, t);
+        }
+        push_connection(connection);
+    }
+}
+
+/// As `offer_particle`, for the strategy (0, t).
+fn offer_particle_strategy(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, unweighted: vec3r, t: u32, pixel: u32) {
+    if any(contribution != vec3r(0.0)) {
+        var connection = connection_of(walk, surface, segment, contribution, pixel);
+        if record_strategies {
+            let attenuated = connection_of(walk, surface, segment, unweighted, pixel);
+            connection.unweighted = attenuated.contribution;
+            connection.strategy = strategy_index(0u, t);
+        }
+        push_particle(connection);
     }
 }
 
