@@ -10,6 +10,7 @@ pub mod film;
 pub mod image_file;
 pub mod picture;
 pub mod profile;
+pub mod pyramid;
 pub mod render;
 pub mod scene;
 pub mod settings;

@@ -203,12 +203,13 @@ impl RenderFile {
         }
     }
 
-    /// Fills in what was not chosen: path tracing, structure of arrays, wavefront, f32.
+    /// Fills in what was not chosen: bidirectional path tracing, array of structures (a bidirectional path visits its stages in no
+    /// order, so its words had better be neighbours), wavefront, f32.
     #[must_use]
     pub fn with_defaults(self) -> Self {
         Self {
-            pipeline: Some("pt".to_owned()),
-            layout: Some("soa".to_owned()),
+            pipeline: Some("sbdpt".to_owned()),
+            layout: Some("aos".to_owned()),
             schedule: Some("wavefront".to_owned()),
             precision: Some("f32".to_owned()),
             ..Self::default()

@@ -9,15 +9,21 @@ use runtime::error::Error;
 use runtime::film::Sums;
 use runtime::image_file::Image;
 use runtime::picture::{Exposure, to_srgb, write_png};
+use runtime::pyramid::{self, Strategy};
 use runtime::render::{Rendered, Session, Settings, Until};
 use runtime::scene::Accelerator;
-use runtime::settings::{RenderFile, State};
+use runtime::settings::{RenderFile, SetValue, State};
 use std::path::{Path, PathBuf};
 
 /// Samples per pixel when nothing says when to stop.
 const DEFAULT_SAMPLES: u32 = 64;
+/// Layers that can be asked for.
+const VARIANCE: &str = "variance";
+const STRATEGIES: &str = "strategies";
+/// The parameter that makes a pipeline keep a picture of each strategy.
+const RECORD_STRATEGIES: &str = "record_strategies";
 
-/// Without arguments: path tracing of the shipped Cornell box.
+/// Without arguments: the flagship pipeline on the shipped Cornell box.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
     /// A pipeline (name or .toml file), a render file, or a rendered .exr, whose picture is rendered again
@@ -47,7 +53,8 @@ pub struct Arguments {
     /// Continue a picture where it was stopped
     #[arg(long, value_name = "PICTURE.exr", conflicts_with_all = ["scene", "camera", "size", "env", "env_scale", "env_rotate", "seed", "set"])]
     resume: Option<PathBuf>,
-    /// Further layers: `variance` writes standard errors as sem.R, sem.G, sem.B
+    /// Further layers: `variance` writes standard errors as sem.R, sem.G, sem.B; `strategies` a picture of each strategy (s, t), weighted
+    /// and unweighted, and the pyramids of them as PNG
     #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
     aov: Vec<String>,
     /// Brightness of the PNG in stops, 1 being white; by default the 95th percentile of the luminance is white
@@ -71,7 +78,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let earlier = arguments.resume.as_deref().map(input::of_picture).transpose()?;
     let mut settings = chosen(arguments, earlier.as_ref().map(|(settings, _)| settings))?;
-    let variance = wants_variance(&settings.aov)?;
+    check_layers(&settings.aov)?;
+    let variance = wants(&settings, VARIANCE);
+    if wants(&settings, STRATEGIES) {
+        settings.set.insert(RECORD_STRATEGIES.to_owned(), SetValue::Bool(true));
+    }
     let until = until(arguments, &settings);
     let output = output(arguments, &settings)?;
 
@@ -102,7 +113,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let rendered = session.picture()?;
     let metadata = metadata(&settings, &rendered, until);
-    let outputs = write(&output, &rendered, &metadata, variance, arguments.exposure)?;
+    let strategies = if wants(&settings, STRATEGIES) { strategies(&rendered, &settings)? } else { Vec::new() };
+    let mut outputs = write(&output, &rendered, &metadata, variance, &strategies, arguments.exposure)?;
+    outputs.extend(write_pyramids(&output, &rendered, &strategies, arguments.exposure)?);
     if progress::interrupted() {
         say(&format!(
             "stopped at {} samples per pixel; continue with `pathloom render --resume {}`",
@@ -132,14 +145,52 @@ fn accelerator(plan: &Plan) -> Accelerator {
     if reads("bvh2_nodes") { Accelerator::Bvh2 } else { Accelerator::Cwbvh }
 }
 
-fn wants_variance(layers: &[String]) -> Result<bool, Error> {
-    match layers.iter().find(|layer| *layer != "variance") {
-        Some(other) => {
-            Err(Error::input(format!("--aov {other}: there is no such layer"))
-                .help("the one layer for now is `variance`"))
-        }
-        None => Ok(!layers.is_empty()),
+fn wants(settings: &RenderFile, layer: &str) -> bool {
+    settings.aov.iter().any(|asked| asked == layer)
+}
+
+fn check_layers(layers: &[String]) -> Result<(), Error> {
+    match layers.iter().find(|layer| ![VARIANCE, STRATEGIES].contains(&layer.as_str())) {
+        Some(other) => Err(Error::input(format!("--aov {other}: there is no such layer"))
+            .help(format!("the layers are `{VARIANCE}` and `{STRATEGIES}`"))),
+        None => Ok(()),
     }
+}
+
+/// The picture of each strategy, weighted and unweighted.
+fn strategies(rendered: &Rendered, settings: &RenderFile) -> Result<Vec<Strategy>, Error> {
+    let found = pyramid::strategies(&|index| rendered.layer(STRATEGIES, index));
+    if found.is_empty() {
+        let pipeline = settings.pipeline.as_deref().unwrap_or("?");
+        return Err(Error::input(format!("the pipeline `{pipeline}` has no strategies to show"))
+            .help("bidirectional pipelines such as `sbdpt` have them"));
+    }
+    Ok(found)
+}
+
+/// The pyramids of strategies beside the picture, `OUT.weighted.png` and `OUT.unweighted.png`.
+fn write_pyramids(
+    path: &Path,
+    rendered: &Rendered,
+    strategies: &[Strategy],
+    exposure: Option<f64>,
+) -> Result<Vec<PathBuf>, Error> {
+    if strategies.is_empty() {
+        return Ok(Vec::new());
+    }
+    let factor = exposure_of(exposure).factor(&rendered.mean);
+    let kinds: [(&str, fn(&Strategy) -> &[f32]); 2] =
+        [("weighted", |strategy| &strategy.weighted), ("unweighted", |strategy| &strategy.unweighted)];
+    let written = kinds.map(|(kind, pixels)| {
+        let file = path.with_extension(format!("{kind}.png"));
+        let (size, rgb) = pyramid::draw(strategies, rendered.size, factor, pixels);
+        write_png(&file, size, &rgb).map(|()| file)
+    });
+    written.into_iter().collect()
+}
+
+fn exposure_of(stops: Option<f64>) -> Exposure {
+    stops.map_or(Exposure::Percentile, |stops| Exposure::Stops(stops as f32))
 }
 
 fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>) -> Result<RenderFile, Error> {
@@ -231,6 +282,7 @@ fn write(
     rendered: &Rendered,
     metadata: &RenderFile,
     errors: bool,
+    strategies: &[Strategy],
     exposure: Option<f64>,
 ) -> Result<Vec<PathBuf>, Error> {
     let standard_error = if errors { rendered.standard_error.clone() } else { None };
@@ -251,9 +303,9 @@ fn write(
         std::fs::create_dir_all(folder)
             .map_err(|error| Error::failed(format!("cannot make the folder: {error}")).in_file(folder))?;
     }
-    image.save(path)?;
+    let layers: Vec<_> = strategies.iter().flat_map(Strategy::layers).collect();
+    image.save_with_layers(path, &layers)?;
     let png = path.with_extension("png");
-    let exposure = exposure.map_or(Exposure::Percentile, |stops| Exposure::Stops(stops as f32));
-    write_png(&png, rendered.size, &to_srgb(&rendered.mean, exposure.factor(&rendered.mean)))?;
+    write_png(&png, rendered.size, &to_srgb(&rendered.mean, exposure_of(exposure).factor(&rendered.mean)))?;
     Ok(vec![path.to_path_buf(), png])
 }

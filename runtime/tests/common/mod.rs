@@ -32,7 +32,8 @@ impl Small {
     pub fn plan(&self) -> Plan {
         let layout = format!("[layout]\norder = \"{}\"\nlane = 1\n", self.order);
         let (queue, accumulate) = (self.queue, self.accumulate);
-        let schedule = format!("[schedule]\nqueue = \"{queue}\"\nworkgroup = 64\naccumulate = \"{accumulate}\"\n");
+        let schedule =
+            format!("[schedule]\nqueue = \"{queue}\"\nworkgroup = 64\ncapacity = 4\naccumulate = \"{accumulate}\"\n");
         let configs = [
             ("pipelines/p.toml", self.pipeline),
             ("layouts/l.toml", layout.as_str()),

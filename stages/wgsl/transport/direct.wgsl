@@ -30,21 +30,21 @@ fn offer_direct_light(walk: ptr<function, Walk>, surface: Surface, light: LightS
 /// Pushes a contribution to the path's own pixel that holds if `segment`, which starts at the walk's newest vertex `surface`, is
 /// free; absorbs along it. Black ones are not worth a ray.
 fn offer(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) {
-    if any(contribution != vec3r(0.0)) {
+    if !all(contribution == vec3r(0.0)) {
         push_connection(connection_of(walk, surface, segment, contribution, pixel));
     }
 }
 
 /// As `offer`, to a pixel that need not be the path's own.
 fn offer_particle(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) {
-    if any(contribution != vec3r(0.0)) {
+    if !all(contribution == vec3r(0.0)) {
         push_particle(connection_of(walk, surface, segment, contribution, pixel));
     }
 }
 
 /// As `offer`, for a strategy (s, t) of several; `unweighted` is what it would contribute alone.
 fn offer_strategy(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, unweighted: vec3r, s: u32, t: u32) {
-    if any(contribution != vec3r(0.0)) {
+    if !all(contribution == vec3r(0.0)) {
         var connection = connection_of(walk, surface, segment, contribution, path_pixel());
         if record_strategies {
             let attenuated = connection_of(walk, surface, segment, unweighted, path_pixel());
@@ -57,7 +57,7 @@ fn offer_strategy(walk: ptr<function, Walk>, surface: Surface, segment: Segment,
 
 /// As `offer_particle`, for the strategy (0, t).
 fn offer_particle_strategy(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, unweighted: vec3r, t: u32, pixel: u32) {
-    if any(contribution != vec3r(0.0)) {
+    if !all(contribution == vec3r(0.0)) {
         var connection = connection_of(walk, surface, segment, contribution, pixel);
         if record_strategies {
             let attenuated = connection_of(walk, surface, segment, unweighted, pixel);
