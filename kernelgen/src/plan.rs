@@ -24,6 +24,9 @@ pub struct Plan {
     /// Tallies, where kernels use one: each has its own part of the buffers of `Role::TallyCounts` and `Role::TallyRates`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tallies: Vec<Tally>,
+    /// Groups of film planes behind the picture, where kernels add to them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<Layers>,
     /// How film words are to be read.
     pub film: Accumulate,
     /// Bytes of state a path slot takes, all tables.
@@ -56,6 +59,32 @@ pub struct Tally {
     pub size: u32,
 }
 
+/// A group of planes of the film.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Layers {
+    /// Its name.
+    pub name: String,
+    /// Its first plane; plane 0 is the picture.
+    pub first: u32,
+    /// How many planes it has.
+    pub size: u32,
+    /// The first word of the tally that corrects it: plane i goes into the picture divided by what paths counted at index i on average.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correct: Option<u32>,
+}
+
+impl Plan {
+    /// Planes of the film: the picture and all layers.
+    pub fn planes(&self) -> u32 {
+        planes(&self.layers)
+    }
+}
+
+/// Planes of a film with these layers.
+pub(crate) fn planes(layers: &[Layers]) -> u32 {
+    layers.iter().fold(1, |planes, group| group.size.saturating_add(planes))
+}
+
 /// A buffer.
 #[derive(Clone, Debug, Serialize)]
 pub struct Buffer {
@@ -81,7 +110,7 @@ pub enum Role {
     Arguments,
     /// Records of a stream.
     Stream,
-    /// The film: three channels a pixel, interleaved, one f32 or i64 each. The runtime zeroes it at the start and reads it.
+    /// The film: plane by plane, three channels a pixel, interleaved, one f32 or i64 each. The runtime zeroes it at the start and reads it.
     Film,
     /// What stages count, a u32 an index of a tally. The runtime zeroes it at the start, reads it and zeroes it when it likes.
     TallyCounts,

@@ -7,6 +7,8 @@ use crate::error::Error;
 use crate::tallies::Tallied;
 use bytemuck::{Pod, Zeroable};
 use kernelgen::config::model::Accumulate;
+use kernelgen::plan::Layers;
+use std::ops::Range;
 use wgpu::BufferUsages;
 
 /// One unit of a fixed-point film.
@@ -14,7 +16,7 @@ pub const FIXED_UNIT: f64 = 1.0 / 16_777_216.0;
 const WORKGROUP: u32 = 64;
 const WIDEST: u32 = 65_535;
 
-/// What has been accumulated, three channels a pixel, row by row.
+/// What has been accumulated: plane by plane, three channels a pixel, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Totals {
     /// Samples per pixel.
@@ -25,6 +27,8 @@ pub struct Totals {
     pub sums: Sums,
     /// For every sum: the sum over batches of n_b (m_b - m)^2, where n_b and m_b are a batch's samples and mean; `None` when unknown.
     pub spread: Option<Vec<f32>>,
+    /// How much of each plane goes into the picture: all of the first, see `shares` of the others.
+    pub shares: Vec<f64>,
     /// What the paths counted, where stages count.
     pub tallied: Option<Tallied>,
 }
@@ -41,27 +45,86 @@ pub enum Sums {
 impl Sums {
     /// The sums as numbers.
     pub fn values(&self) -> Vec<f64> {
+        self.values_of(0..self.len())
+    }
+
+    fn values_of(&self, words: Range<usize>) -> Vec<f64> {
         match self {
-            Sums::Float(values) => values.clone(),
-            Sums::Fixed(units) => units.iter().map(|&unit| unit as f64 * FIXED_UNIT).collect(),
+            Sums::Float(values) => values[words].to_vec(),
+            Sums::Fixed(units) => units[words].iter().map(|&unit| unit as f64 * FIXED_UNIT).collect(),
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Sums::Float(values) => values.len(),
+            Sums::Fixed(units) => units.len(),
         }
     }
 }
 
 impl Totals {
-    /// Mean radiance, W m^-2 sr^-1.
+    /// Mean radiance of the picture, W m^-2 sr^-1: the first plane and the shares of the others.
     pub fn mean(&self) -> Vec<f32> {
-        let samples = f64::from(self.samples.max(1));
-        self.sums.values().iter().map(|sum| (sum / samples) as f32).collect()
+        self.means(&self.picture_sums())
     }
 
     /// Standard error of the mean; `None` before the second batch.
     ///
-    /// With batches of n_b samples each, sum n_b (m_b - m)^2 / (B - 1) estimates the variance of one sample.
+    /// With batches of n_b samples each, sum n_b (m_b - m)^2 / (B - 1) estimates the variance of one sample. Planes are taken as
+    /// independent of each other: their covariances are left out.
     pub fn standard_error(&self) -> Option<Vec<f32>> {
-        let spread = self.spread.as_ref().filter(|_| self.batches >= 2)?;
-        let scale = 1.0 / (f64::from(self.batches - 1) * f64::from(self.samples));
-        Some(spread.iter().map(|&value| (f64::from(value) * scale).sqrt() as f32).collect())
+        let spread = self.spread.as_ref()?;
+        let squares = self.added(|plane, share| {
+            let values = spread[self.words_of(plane)].iter();
+            values.map(|&value| share * share * f64::from(value)).collect()
+        });
+        self.errors(&squares)
+    }
+
+    /// Mean of a plane, by its number, as it was added up: without its share in the picture.
+    pub fn plane_mean(&self, plane: usize) -> Vec<f32> {
+        self.means(&self.sums.values_of(self.words_of(plane)))
+    }
+
+    /// Standard error of the mean of a plane; `None` before the second batch.
+    pub fn plane_standard_error(&self, plane: usize) -> Option<Vec<f32>> {
+        let squares: Vec<f64> = self.spread.as_ref()?[self.words_of(plane)].iter().copied().map(f64::from).collect();
+        self.errors(&squares)
+    }
+
+    fn picture_sums(&self) -> Vec<f64> {
+        self.added(|plane, share| {
+            let mut values = self.sums.values_of(self.words_of(plane));
+            values.iter_mut().for_each(|value| *value *= share);
+            values
+        })
+    }
+
+    /// Adds up something of every plane that has a share in the picture.
+    fn added(&self, values: impl Fn(usize, f64) -> Vec<f64>) -> Vec<f64> {
+        let mut added = values(0, self.shares[0]);
+        for (plane, &share) in self.shares.iter().enumerate().skip(1).filter(|(_, share)| **share != 0.0) {
+            for (sum, value) in added.iter_mut().zip(values(plane, share)) {
+                *sum += value;
+            }
+        }
+        added
+    }
+
+    fn means(&self, sums: &[f64]) -> Vec<f32> {
+        let samples = f64::from(self.samples.max(1));
+        sums.iter().map(|sum| (sum / samples) as f32).collect()
+    }
+
+    fn errors(&self, squares: &[f64]) -> Option<Vec<f32>> {
+        let scale = 1.0 / (f64::from(self.batches.checked_sub(1).filter(|&more| more > 0)?) * f64::from(self.samples));
+        Some(squares.iter().map(|value| (value * scale).sqrt() as f32).collect())
+    }
+
+    fn words_of(&self, plane: usize) -> Range<usize> {
+        let words = self.sums.len() / self.shares.len();
+        plane * words..(plane + 1) * words
     }
 
     /// Root mean square of the standard errors over the mean radiance of the picture; infinite before the second batch.
@@ -69,9 +132,24 @@ impl Totals {
         let Some(errors) = self.standard_error() else { return f64::INFINITY };
         let count = errors.len().max(1) as f64;
         let square = errors.iter().map(|&error| f64::from(error).powi(2)).sum::<f64>() / count;
-        let mean = self.sums.values().iter().sum::<f64>() / (count * f64::from(self.samples));
+        let mean = self.picture_sums().iter().sum::<f64>() / (count * f64::from(self.samples));
         if mean > 0.0 { square.sqrt() / mean } else { 0.0 }
     }
+}
+
+/// How much of each plane goes into the picture: the first as it is, a corrected layer divided by how often a path counted on average
+/// over the whole render, other layers not at all. A layer that was never counted is black.
+pub fn shares(layers: &[Layers], tallied: Option<&Tallied>) -> Vec<f64> {
+    let share = |word: u32| {
+        let tallied = tallied?;
+        let count = tallied.counts.get(word as usize).copied().filter(|&count| count > 0)?;
+        Some(tallied.slots as f64 / count as f64)
+    };
+    let mut shares = vec![1.0];
+    for group in layers {
+        shares.extend((0..group.size).map(|index| share(group.correct? + index)).map(Option::unwrap_or_default));
+    }
+    shares
 }
 
 #[repr(C)]
@@ -97,12 +175,13 @@ pub struct Accumulator {
 }
 
 impl Accumulator {
-    /// Zeroed sums for a film.
+    /// Zeroed sums for a film of so many pixels on all its planes.
     ///
     /// # Errors
     /// User input when the picture is too large for the adapter; failed when memory runs out.
     pub fn new(gpu: &Gpu, kind: Accumulate, pixels: u64, film: &wgpu::Buffer) -> Result<Self, Error> {
-        let words = u32::try_from(pixels * 3).map_err(|_| Error::input("the picture has too many pixels"))?;
+        let words =
+            u32::try_from(pixels * 3).map_err(|_| Error::input("the picture has too many pixels and layers"))?;
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let uniform =
             create(gpu, "batch", size_of::<BatchUniform>() as u64, BufferUsages::UNIFORM | BufferUsages::COPY_DST)?;
@@ -174,7 +253,7 @@ impl Accumulator {
             Sums::Float(pairs.map(|[high, low]| f64::from(high) + f64::from(low)).collect())
         };
         let spread = spread.chunks_exact(4).take(words).map(bytemuck::pod_read_unaligned).collect();
-        Ok(Totals { samples, batches, sums, spread: Some(spread), tallied: None })
+        Ok(Totals { samples, batches, sums, spread: Some(spread), shares: vec![1.0], tallied: None })
     }
 
     /// Continues from earlier sums, rounding them to this film's kind where the kinds differ.

@@ -64,6 +64,14 @@ impl Image {
     /// # Errors
     /// Failed, when the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), Error> {
+        self.save_with_layers(path, &[])
+    }
+
+    /// `save` with further layers, three channels a pixel each: `NAME.R`, `NAME.G`, `NAME.B`.
+    ///
+    /// # Errors
+    /// As `save`.
+    pub fn save_with_layers(&self, path: &Path, layers: &[(String, Vec<f32>)]) -> Result<(), Error> {
         let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
         for (index, colour) in COLOURS.iter().enumerate() {
             channels.push(AnyChannel::new(*colour, FlatSamples::F32(plane(&self.radiance, index))));
@@ -75,6 +83,12 @@ impl Image {
                 let half = |shift: u32| plane(sums, index).iter().map(|&sum| (sum >> shift) as u32).collect();
                 channels.push(AnyChannel::new(format!("sum.{colour}.low").as_str(), FlatSamples::U32(half(0))));
                 channels.push(AnyChannel::new(format!("sum.{colour}.high").as_str(), FlatSamples::U32(half(32))));
+            }
+        }
+        for (name, pixels) in layers {
+            for (index, colour) in COLOURS.iter().enumerate() {
+                let samples = FlatSamples::F32(plane(pixels, index));
+                channels.push(AnyChannel::new(format!("{name}.{colour}").as_str(), samples));
             }
         }
         let mut attributes = LayerAttributes::default();
@@ -100,7 +114,7 @@ impl Image {
             // One batch does not deviate from itself.
             None => (batches <= 1).then(|| vec![0.0; self.radiance.len()]),
         };
-        Totals { samples, batches, sums, spread, tallied: None }
+        Totals { samples, batches, sums, spread, shares: vec![1.0], tallied: None }
     }
 }
 
@@ -183,7 +197,7 @@ mod tests {
     #[test]
     fn standard_errors_survive_totals() {
         let (sums, spread) = (Sums::Float(vec![6.4; 3]), Some(vec![2.0; 3]));
-        let totals = Totals { samples: 64, batches: 8, sums, spread, tallied: None };
+        let totals = Totals { samples: 64, batches: 8, sums, spread, shares: vec![1.0], tallied: None };
         let image = Image {
             size: [1, 1],
             radiance: totals.mean(),

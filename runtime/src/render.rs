@@ -4,12 +4,10 @@ use crate::buffers::{Buffers, Resources, choose_path_count, usable_slots};
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::execute::{Counters, Executor, IN_FLIGHT, Pass};
-use crate::film::{Accumulator, Sums, Totals};
-use crate::image_file::Image;
+use crate::film::{Accumulator, Totals, shares};
 use crate::profile::Profile;
-use crate::settings::RenderFile;
 use crate::tallies::{PILOT_SEED, PILOT_SLOTS, Tallies};
-use kernelgen::plan::{Plan, Role};
+use kernelgen::plan::{Layers, Plan, Role};
 use std::time::Instant;
 
 /// Passes are cut so that one takes about this long, s: drivers and Ctrl-C get their turn.
@@ -62,6 +60,8 @@ pub struct Progress {
 pub struct Rendered {
     /// Width and height in pixels.
     pub size: [u32; 2],
+    /// Groups of layers behind the picture.
+    pub layers: Vec<Layers>,
     /// Everything accumulated, also by earlier runs.
     pub totals: Totals,
     /// Mean radiance, three channels a pixel, row by row from the top, W m^-2 sr^-1.
@@ -79,21 +79,19 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// The picture as a file holds it.
-    ///
-    /// # Errors
-    /// Failed, when the settings have no TOML form.
-    pub fn image(&self, metadata: &RenderFile, standard_errors: bool) -> Result<Image, Error> {
-        Ok(Image {
-            size: self.size,
-            radiance: self.mean.clone(),
-            standard_error: if standard_errors { self.standard_error.clone() } else { None },
-            fixed: match &self.totals.sums {
-                Sums::Fixed(units) => Some(units.clone()),
-                Sums::Float(_) => None,
-            },
-            settings: Some(metadata.to_toml()?),
-        })
+    /// Mean of a layer, without correction; `None` where there is no such group or index.
+    pub fn layer(&self, group: &str, index: u32) -> Option<Vec<f32>> {
+        Some(self.totals.plane_mean(self.plane(group, index)?))
+    }
+
+    /// Standard error of the mean of a layer; `None` also before the second batch.
+    pub fn layer_standard_error(&self, group: &str, index: u32) -> Option<Vec<f32>> {
+        self.totals.plane_standard_error(self.plane(group, index)?)
+    }
+
+    fn plane(&self, group: &str, index: u32) -> Option<usize> {
+        let group = self.layers.iter().find(|layers| layers.name == group)?;
+        (index < group.size).then_some((group.first + index) as usize)
     }
 }
 
@@ -103,6 +101,7 @@ pub struct Session {
     gpu: Gpu,
     executor: Executor,
     accumulator: Accumulator,
+    layers: Vec<Layers>,
     tallies: Option<Tallies>,
     /// Whether the pilot is still to come.
     unpiloted: bool,
@@ -138,7 +137,12 @@ impl Session {
         let total = work.map(|samples| u64::from(samples) * u64::from(pixels));
         let path_count = choose_path_count(gpu, plan, pixels.into(), settings.paths, total)?;
         let buffers = Buffers::new(gpu, plan, pixels.into(), path_count, resources)?;
-        let accumulator = Accumulator::new(gpu, plan.film, pixels.into(), buffers.of(plan, Role::Film)?)?;
+        let accumulator = Accumulator::new(
+            gpu,
+            plan.film,
+            u64::from(pixels) * u64::from(plan.planes()),
+            buffers.of(plan, Role::Film)?,
+        )?;
         let executor = Executor::new(gpu, plan, &buffers)?;
         let tallies = Tallies::new(plan, &buffers);
         gpu.check()?;
@@ -147,6 +151,7 @@ impl Session {
             gpu: gpu.clone(),
             executor,
             accumulator,
+            layers: plan.layers.clone(),
             unpiloted: tallies.as_ref().is_some_and(Tallies::have_rates),
             tallies,
             settings,
@@ -168,8 +173,12 @@ impl Session {
     /// Continues an earlier render: its samples are neither lost nor taken again. Call before `run`.
     ///
     /// # Errors
-    /// User input, when its size differs, or its paths counted something else.
+    /// User input, when its size differs, or its paths counted something else, or it comes without its layers.
     pub fn resume(&mut self, totals: &Totals) -> Result<(), Error> {
+        if !self.layers.is_empty() && totals.shares.len() == 1 {
+            let error = Error::input("cannot resume a picture with layers");
+            return Err(error.help("its file holds their sum, not each of them"));
+        }
         if let Some(tallies) = &mut self.tallies {
             tallies.resume(totals.tallied.as_ref())?;
         }
@@ -389,6 +398,7 @@ impl Session {
         if !self.spread_known {
             totals.spread = None;
         }
+        totals.shares = shares(&self.layers, self.tallies.as_ref().map(Tallies::tallied));
         totals.tallied = self.tallies.as_ref().map(|tallies| tallies.tallied().clone());
         Ok(totals)
     }
@@ -413,6 +423,7 @@ impl Session {
             size: self.settings.size,
             mean: totals.mean(),
             standard_error: totals.standard_error(),
+            layers: self.layers.clone(),
             totals,
             samples_taken: self.samples - self.samples_before,
             counters: self.counters,

@@ -7,11 +7,15 @@ use crate::scene::{self, BuildPreset, LoadOptions, Scene};
 use crate::tallies::Tallied;
 use indexmap::IndexMap;
 use kernelgen::config::model::{Effects, Selection};
+use kernelgen::plan::Plan;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::path::Path;
 
 /// The scene that is rendered when none is named.
 pub const DEFAULT_SCENE: &str = "cornell_box";
+/// The parameter that makes a pipeline keep a picture of each strategy.
+const RECORD_STRATEGIES: &str = "record_strategies";
 
 /// Everything that fixes a picture; every key is optional.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -61,7 +65,7 @@ pub struct RenderFile {
     pub env_rotate: Option<f64>,
     /// Further layers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub aov: Vec<String>,
+    pub aov: Vec<Aov>,
     /// Radius of the camera's lens, m; 0 is a pinhole.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens_radius: Option<f32>,
@@ -102,6 +106,27 @@ impl Camera {
             Camera::Index(index) => index.to_string(),
             Camera::Name(name) => name.clone(),
         }
+    }
+}
+
+/// What a picture's file may hold beside the radiance. Shown by the word for it in settings and on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Aov {
+    /// Standard errors.
+    Variance,
+    /// A picture of each strategy (s, t): the layers of this name in the plan.
+    Strategies,
+}
+
+impl Aov {
+    /// All of them.
+    pub const ALL: [Aov; 2] = [Aov::Variance, Aov::Strategies];
+}
+
+impl fmt::Display for Aov {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(out)
     }
 }
 
@@ -207,12 +232,13 @@ impl RenderFile {
         }
     }
 
-    /// Fills in what was not chosen: path tracing, structure of arrays, wavefront, f32.
+    /// Fills in what was not chosen: bidirectional path tracing, array of structures (a bidirectional path visits its stages in no
+    /// order, so its words had better be neighbours), wavefront, f32.
     #[must_use]
     pub fn with_defaults(self) -> Self {
         Self {
-            pipeline: Some("pt".to_owned()),
-            layout: Some("soa".to_owned()),
+            pipeline: Some("sbdpt".to_owned()),
+            layout: Some("aos".to_owned()),
             schedule: Some("wavefront".to_owned()),
             precision: Some("f32".to_owned()),
             ..Self::default()
@@ -239,16 +265,23 @@ impl RenderFile {
         with_scene(self.scene.as_deref().unwrap_or(DEFAULT_SCENE), |path| scene::load(path, &options))
     }
 
-    /// Whether the layers asked for hold standard errors.
+    /// Whether a layer is asked for.
+    pub fn wants(&self, layer: Aov) -> bool {
+        self.aov.contains(&layer)
+    }
+
+    /// Refuses a plan that cannot give the layers asked for.
     ///
     /// # Errors
-    /// User input, when there is no layer of a name.
-    pub fn wants_variance(&self) -> Result<bool, Error> {
-        match self.aov.iter().find(|layer| *layer != "variance") {
-            Some(other) => Err(Error::input(format!("--aov {other}: there is no such layer"))
-                .help("the one layer for now is `variance`")),
-            None => Ok(!self.aov.is_empty()),
+    /// User input, when the pipeline has no strategies.
+    pub fn check_layers(&self, plan: &Plan) -> Result<(), Error> {
+        let has = |layer: Aov| plan.layers.iter().any(|group| group.name == layer.to_string());
+        if !self.wants(Aov::Strategies) || has(Aov::Strategies) {
+            return Ok(());
         }
+        let pipeline = self.pipeline.as_deref().unwrap_or_default();
+        Err(Error::input(format!("the pipeline `{pipeline}` has no strategies to show"))
+            .help("bidirectional pipelines such as `sbdpt` have them"))
     }
 
     /// The settings as they go into the metadata of the picture that they gave.
@@ -281,12 +314,13 @@ impl RenderFile {
             Some(word) => library.resolve(axis, word),
             None => Err(Error::input(format!("no {} is chosen", axis.word()))),
         };
+        let recorded = self.wants(Aov::Strategies).then(|| (RECORD_STRATEGIES.to_owned(), true.to_string()));
         Ok(Selection {
             pipeline: key(Axis::Pipeline, &self.pipeline)?,
             layout: key(Axis::Layout, &self.layout)?,
             schedule: key(Axis::Schedule, &self.schedule)?,
             precision: key(Axis::Precision, &self.precision)?,
-            set: self.set.iter().map(|(key, value)| (key.clone(), value.word())).collect(),
+            set: self.set.iter().map(|(key, value)| (key.clone(), value.word())).chain(recorded).collect(),
             effects,
         })
     }

@@ -1,11 +1,12 @@
 //! Tallies through the whole runtime: a pipeline of one stage that counts, and whose picture is made of the rates it reads.
 
-use kernelgen::config::model::Selection;
+mod common;
+
+use common::{SIZE, Small, gpu, rendered, session};
 use kernelgen::plan::Plan;
-use kernelgen::source::{FileKind, Sources};
-use runtime::device::{DeviceOptions, Gpu};
+use runtime::execute::Counters;
 use runtime::film::Totals;
-use runtime::render::{Rendered, Session, Settings, Until};
+use runtime::render::Until;
 use runtime::tallies::PILOT_SLOTS;
 
 const PIPELINE: &str = r#"
@@ -41,12 +42,6 @@ import package::real::vec3r;
 import package::state::Path;
 import package::tallies::{count_drawn, drawn_rate};
 
-fn hash(x: u32) -> u32 {
-    let h = x * 747796405u + 2891336453u;
-    let word = ((h >> ((h >> 28u) + 4u)) ^ h) * 277803737u;
-    return (word >> 22u) ^ word;
-}
-
 /// Draws 0, 1 or 2.
 fn draw(path: ptr<function, Path>) -> u32 {
     path.number = hash(hash(path_pixel()) + hash(path_sample()) + pass_seed()) % numbers;
@@ -62,41 +57,8 @@ fn show(path: ptr<function, Path>) -> u32 {
 }
 "#;
 
-const SIZE: [u32; 2] = [70, 30];
-
-fn plan(order: &str, queue: &str) -> Plan {
-    let layout = format!("[layout]\norder = \"{order}\"\nlane = 1\n");
-    let schedule = format!("[schedule]\nqueue = \"{queue}\"\nworkgroup = 64\naccumulate = \"fixed_i64\"\n");
-    let mut sources = Sources::default();
-    let configs = [
-        ("pipelines/p.toml", PIPELINE),
-        ("layouts/l.toml", layout.as_str()),
-        ("schedules/s.toml", schedule.as_str()),
-        ("precisions/f.toml", "[precision]\nreal = \"f32\"\n"),
-    ];
-    for (key, text) in configs {
-        sources.add(FileKind::Config, key, key, text);
-    }
-    sources.add(FileKind::Module, "stage/draw", "stage/draw.wgsl", STAGES);
-    let [pipeline, layout, schedule, precision] = configs.map(|(key, _)| key.to_owned());
-    let selection = Selection { pipeline, layout, schedule, precision, ..Selection::default() };
-    let generated = kernelgen::generate(&sources, &selection);
-    generated.unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan
-}
-
-fn session(gpu: &Gpu, plan: &Plan, paths: u32) -> Session {
-    let settings = Settings { size: SIZE, seed: 7, paths: Some(paths) };
-    Session::new(gpu, plan, &|_| None, settings, None).expect("a session")
-}
-
-fn rendered(gpu: &Gpu, plan: &Plan, paths: u32, samples: u32) -> Rendered {
-    let mut session = session(gpu, plan, paths);
-    session.run(Until::Samples(samples), &mut |_| true).expect("a render");
-    session.picture().expect("a picture")
-}
-
-fn gpu() -> Gpu {
-    Gpu::open(&DeviceOptions::default()).expect("an adapter")
+fn plan(order: &'static str, queue: &'static str) -> Plan {
+    Small { pipeline: PIPELINE, stages: STAGES, order, queue, accumulate: "fixed_i64" }.plan()
 }
 
 #[test]
@@ -150,7 +112,7 @@ fn the_pilot_leaves_no_light_and_no_rays_and_is_not_the_picture() {
     for pixel in one.mean.chunks_exact(3) {
         assert!((pixel.iter().sum::<f32>() - 2.0).abs() < 1e-5, "{pixel:?}");
     }
-    assert_eq!(one.counters, runtime::execute::Counters::default());
+    assert_eq!(one.counters, Counters::default());
     assert!(one.profile.passes <= 1, "the pilot was measured too");
 }
 

@@ -1,8 +1,11 @@
 //! What the whole-system tests share: scenes built in memory, skies, and statistics; and the scenes that the repository ships.
 
+pub mod closed_form;
+pub mod compared;
 pub mod glb;
 pub mod how_to;
 pub mod material;
+pub mod mutation;
 pub mod probe;
 pub mod refuse;
 pub mod rendering;

@@ -4,6 +4,7 @@ use crate::scene_builder::SceneBuilder;
 use crate::sky::Sky;
 use crate::statistics::Pixels;
 use kernelgen::plan::Plan;
+use kernelgen::source::FileKind;
 use runtime::configs::Library;
 use runtime::device::{DeviceOptions, Gpu};
 use runtime::film::Sums;
@@ -11,6 +12,7 @@ use runtime::image_file::Image;
 use runtime::render::{Rendered, Session, Settings, Until};
 use runtime::scene::{Accelerator, LoadOptions, Scene};
 use runtime::settings::{RenderFile, SetValue};
+use runtime::tallies::Tallied;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -49,6 +51,8 @@ pub struct Rendering {
     pub visibility: u64,
     /// Sums of a fixed-point film: what must be equal bit for bit where images must be. Empty for other films.
     pub sums: Vec<i64>,
+    /// What stages tallied, for each path; empty where they tally nothing.
+    pub tallies: Vec<f64>,
 }
 
 impl Job {
@@ -92,6 +96,19 @@ impl Job {
     /// Other configs and stages than the shipped ones.
     pub fn library(mut self, library: Library) -> Job {
         self.library = library;
+        self
+    }
+
+    /// One module changed: `old`, which must stand in it exactly once, becomes `new`.
+    #[track_caller]
+    pub fn edited(mut self, key: &str, old: &str, new: &str) -> Job {
+        let sources = &mut self.library.sources;
+        let file = sources.find(FileKind::Module, key).unwrap_or_else(|| panic!("there is no module {key}"));
+        let text = &sources.file(file).text;
+        let count = text.matches(old).count();
+        assert!(count == 1, "{key} has `{old}` {count} times, not once");
+        let text = text.replacen(old, new, 1);
+        sources.add(FileKind::Module, key, format!("{key}.wgsl"), text);
         self
     }
 
@@ -199,7 +216,12 @@ fn rendering(rendered: &Rendered) -> Rendering {
             Sums::Fixed(units) => units.clone(),
             Sums::Float(_) => Vec::new(),
         },
+        tallies: rendered.totals.tallied.as_ref().map(rates).unwrap_or_default(),
     }
+}
+
+fn rates(tallied: &Tallied) -> Vec<f64> {
+    tallied.counts.iter().map(|&count| count as f64 / tallied.slots as f64).collect()
 }
 
 fn pixels(size: [u32; 2], mean: &[f32], errors: &[f32]) -> Pixels {

@@ -23,6 +23,11 @@ impl Estimate {
         Estimate { mean, error: 0.0 }
     }
 
+    /// The standard error as a share of the mean, infinite where that is not positive.
+    fn noise(&self) -> f64 {
+        if self.mean > 0.0 { self.error / self.mean } else { f64::INFINITY }
+    }
+
     /// How many combined standard errors two means lie apart; `floor` is an error that both share (rounding), so that exact values compare.
     pub fn z(&self, other: &Estimate, floor: f64) -> f64 {
         let error = (self.error.powi(2) + other.error.powi(2) + floor.powi(2)).sqrt();
@@ -72,6 +77,11 @@ impl Pixels {
             mean: channels.iter().map(|channel| channel.mean).sum::<f64>() / 3.0,
             error: channels.iter().map(|channel| channel.error).sum::<f64>() / 3.0,
         }
+    }
+
+    /// An image known without error.
+    pub fn exact(width: usize, height: usize, rgb: Vec<[f32; 3]>) -> Pixels {
+        Pixels { width, height, errors: vec![[0.0; 3]; rgb.len()], rgb }
     }
 
     /// The image with squares of `factor` pixels made one. Pixels that do not fill a square at the right and lower edges are left out.
@@ -157,6 +167,34 @@ impl Spread {
 /// z-scores of two rows of estimates, with a shared relative rounding error.
 pub fn z_scores(a: &[Estimate], b: &[Estimate], relative_floor: f64) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a.z(b, relative_floor * a.mean.abs().max(b.mean.abs()))).collect()
+}
+
+/// What two images, or an image and what it must be, say of each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// z-scores of blocks of pixels.
+    pub blocks: Spread,
+    /// z-score of the mean over the image.
+    pub mean: f64,
+    /// The larger standard error of the two means, as a share of its mean; infinite for a black image.
+    pub noise: f64,
+}
+
+impl Comparison {
+    /// Compares means over blocks of `block` x `block` pixels and over everything, with a shared relative rounding error.
+    pub fn of(a: &Pixels, b: &Pixels, block: usize, relative_floor: f64) -> Comparison {
+        let (mean_a, mean_b) = (a.mean_estimate(), b.mean_estimate());
+        Comparison {
+            blocks: spread(&z_scores(&a.block_estimates(block), &b.block_estimates(block), relative_floor)),
+            mean: mean_a.z(&mean_b, relative_floor * mean_a.mean.abs()),
+            noise: mean_a.noise().max(mean_b.noise()),
+        }
+    }
+
+    /// The rule for two renderings of one image, for blocks and for the mean. It says nothing where there is too much noise.
+    pub fn agrees(&self) -> bool {
+        self.blocks.agrees() && self.mean.abs() < 4.0
+    }
 }
 
 /// The result of a chi-square test.
@@ -293,6 +331,22 @@ mod tests {
         let small = pixels.shrunk(2);
         assert_eq!((small.width, small.height), (1, 1));
         assert_eq!((small.rgb[0], small.errors[0]), ([2.0; 3], [0.5; 3]));
+    }
+
+    #[test]
+    fn comparisons_look_at_blocks_and_at_the_mean() {
+        let expected = Pixels::exact(2, 1, vec![[1.0; 3]; 2]);
+        let shifted = |left: f32, right: f32| Pixels {
+            rgb: vec![[left; 3], [right; 3]],
+            errors: vec![[0.01; 3]; 2],
+            ..expected.clone()
+        };
+        assert!(Comparison::of(&shifted(1.01, 0.98), &expected, 1, 0.0).agrees());
+        let uneven = Comparison::of(&shifted(1.1, 0.9), &expected, 1, 0.0);
+        assert!(uneven.mean.abs() < 1e-3 && !uneven.agrees());
+        let brighter = Comparison::of(&shifted(1.035, 1.035), &expected, 1, 0.0);
+        assert!(brighter.blocks.agrees() && !brighter.agrees());
+        assert!((brighter.noise - 0.01 / (1.035 * 2.0f64.sqrt())).abs() < 1e-6);
     }
 
     #[test]

@@ -1,11 +1,10 @@
 //! Pipelines that can sample the same light converge to the same image: block means agree within their standard errors.
 
-use glam::{DVec3, dvec3};
+use glam::dvec3;
+use tests::compared::{ball_beside_a_wall, beside_a_caustic, lamps, leaning_mirror, sun_and_sky};
 use tests::material::Material;
-use tests::rendering::{BuiltScene, Job, Rendering, shipped};
-use tests::scene_builder::{Camera, SceneBuilder};
-use tests::shape::{Mesh, quad, sphere, turned_cuboid};
-use tests::sky::Sky;
+use tests::rendering::{Job, Rendering, shipped};
+use tests::shape::{Mesh, sphere};
 use tests::statistics::{spread, z_scores};
 
 const BLOCK: usize = 8;
@@ -45,7 +44,7 @@ fn nee_pt_and_lt_agree_on_the_cornell_box() {
 
 #[test]
 fn balance_and_power_heuristic_agree() {
-    let job = Job::of_file(shipped("cornell_box")).size(48, 48).edges(4).samples(128);
+    let job = Job::of_file(shipped("cornell_box")).pipeline("pt").size(48, 48).edges(4).samples(128);
     let renders = ["balance", "power"].map(|heuristic| job.clone().set("heuristic", heuristic).render());
     assert_agree(&renders[0], &renders[1], "balance and power");
 }
@@ -59,16 +58,7 @@ fn nee_and_pt_agree_on_one_light_of_each_kind() {
 
 #[test]
 fn lt_agrees_where_no_light_is_at_infinity() {
-    let mut scene = SceneBuilder::new();
-    let floor = scene.material(Material::lambert("floor", [0.6, 0.5, 0.4]));
-    let panel = scene.material(Material::emitter("panel", [4.0, 1.0, 2.0]).two_sided());
-    scene.floor(floor, 0.0, 4.0);
-    scene.quad(floor, dvec3(-2.0, 0.0, -2.0), DVec3::X * 4.0, DVec3::Y * 2.5);
-    scene.quad(panel, dvec3(-1.2, 0.8, -0.4), DVec3::X * 0.5, DVec3::Y * 0.4);
-    scene.point_light(dvec3(0.5, 1.2, 0.2), [0.5, 1.0, 0.2]);
-    scene.spot_light(dvec3(1.2, 2.0, 0.8), dvec3(-0.5, -1.0, -0.4), [3.0, 2.0, 6.0], 0.3, 0.5);
-    scene.camera("main", Camera { eye: dvec3(0.0, 1.4, 4.5), target: dvec3(0.0, 0.7, 0.0), yfov: 40.0, aspect: 1.0 });
-    let scene = BuiltScene::new(&scene, None);
+    let scene = lamps();
     let job = scene.job().size(48, 48).edges(4);
     let renders = render_all(&job, &[("nee", 256), ("pt", 256), ("lt", 512)]);
     assert_agree(&renders[0], &renders[1], "nee and pt");
@@ -78,15 +68,7 @@ fn lt_agrees_where_no_light_is_at_infinity() {
 /// Lights at infinity: a sun, and a sky that is bright on one side.
 #[test]
 fn nee_pt_and_lt_agree_under_sun_and_sky() {
-    let mut scene = SceneBuilder::new();
-    let floor = scene.material(Material::lambert("floor", [0.6, 0.5, 0.4]));
-    let block = scene.material(Material::lambert("block", [0.3, 0.6, 0.7]));
-    scene.floor(floor, 0.0, 3.0);
-    scene.mesh(block, turned_cuboid(dvec3(-0.6, 0.0, -0.4), dvec3(0.1, 0.9, 0.3), 0.4));
-    scene.directional_light(dvec3(0.5, -1.0, -0.3), [1.5, 1.2, 0.8]);
-    scene.camera("main", Camera { eye: dvec3(0.3, 1.5, 4.0), target: dvec3(0.0, 0.3, 0.0), yfov: 38.0, aspect: 1.0 });
-    let sky = Sky::from_directions(32, 16, |towards| [0.2 + 0.8 * towards.x.max(0.0), 0.3, 0.6 + 0.4 * towards.y]);
-    let scene = BuiltScene::new(&scene, Some(&sky));
+    let scene = sun_and_sky();
     let job = scene.job().size(48, 48).edges(4);
     let renders = render_all(&job, &[("nee", 256), ("pt", 256), ("lt", 1024)]);
     assert_agree(&renders[0], &renders[1], "nee and pt");
@@ -120,20 +102,6 @@ fn lt_and_pt_agree_on_rough_glass_and_metal() {
     }
 }
 
-/// A ball of `rings` rings with smooth normals in the light of a panel, beside a wall that it colours.
-fn ball_beside_a_wall(material: Material, rings: u32) -> BuiltScene {
-    let mut scene = SceneBuilder::new();
-    let wall = scene.material(Material::lambert("wall", [0.7; 3]));
-    let ball = scene.material(material);
-    let light = scene.material(Material::emitter("light", [6.0; 3]));
-    scene.floor(wall, 0.0, 3.0);
-    scene.quad(wall, dvec3(-0.9, 0.0, 1.0), DVec3::NEG_Z * 2.0, DVec3::Y * 1.6);
-    scene.mesh(ball, sphere(dvec3(0.0, 0.6, 0.0), 0.5, rings));
-    scene.quad(light, dvec3(0.9, 1.3, -0.5), DVec3::new(0.4, 0.5, 0.0), DVec3::Z);
-    scene.camera("main", Camera { eye: dvec3(0.5, 1.0, 4.0), target: dvec3(-0.2, 0.5, 0.0), yfov: 32.0, aspect: 1.0 });
-    BuiltScene::new(&scene, None)
-}
-
 /// A caustic of a glass ball: walks from the camera find the light by chance, walks from the light find the floor.
 #[test]
 fn lt_and_pt_agree_on_a_caustic_of_glass() {
@@ -144,24 +112,13 @@ fn lt_and_pt_agree_on_a_caustic_of_glass() {
 /// A caustic of a mirror whose normals are tilted towards the floor: deltas must weigh shading normals as other lobes do.
 #[test]
 fn lt_and_pt_agree_on_a_caustic_of_a_mirror() {
-    let mut plate = quad(dvec3(-0.6, 0.0, 1.0), DVec3::NEG_Z * 2.0, DVec3::Y * 1.5);
-    plate.normals = vec![dvec3(0.4f64.cos(), -0.4f64.sin(), 0.0); 4];
-    assert_caustics_agree(Material::metal("mirror", [0.9, 0.8, 0.7], 0.0), plate);
+    assert_caustics_agree(Material::metal("mirror", [0.9, 0.8, 0.7], 0.0), leaning_mirror());
 }
 
-/// The floor beside or below a shape, in the light of a panel. The shape is out of the picture: walks from the light cannot be joined
-/// to a camera through smooth glass.
+/// The floor beside or below a shape looks the same from the camera and from the light.
 #[track_caller]
 fn assert_caustics_agree(material: Material, shape: Mesh) {
-    let mut scene = SceneBuilder::new();
-    let floor = scene.material(Material::lambert("floor", [0.7; 3]));
-    let material = scene.material(material);
-    let light = scene.material(Material::emitter("light", [3.0; 3]));
-    scene.floor(floor, 0.0, 4.0);
-    scene.mesh(material, shape);
-    scene.ceiling(light, 2.0, 1.6);
-    scene.camera("main", Camera { eye: dvec3(0.0, 0.15, 3.0), target: dvec3(0.0, 0.0, 0.0), yfov: 6.0, aspect: 2.0 });
-    let scene = BuiltScene::new(&scene, None);
+    let scene = beside_a_caustic(material, shape);
     let job = scene.job().size(48, 24).edges(8);
     let renders = render_all(&job, &[("pt", 1024), ("lt", 2048)]);
     assert_agree(&renders[1], &renders[0], "lt and pt");

@@ -1,7 +1,10 @@
 //! Scenes whose radiance is known in closed form, rendered by every pipeline that can. The numbers are those of algorithm.md section 9.
 
 use glam::{DVec2, DVec3, dvec3};
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
+use tests::closed_form::{FLOOR, FROM_ABOVE, FROM_BELOW_THE_LIGHT, WIDE, assert_mean, ball_in_a_constant_sky};
+use tests::closed_form::{factor_of_unit_disk, factor_of_unit_square, floor_below_glass, furnace as furnace_room};
+use tests::closed_form::{glass_over_a_floor, grey, lambert_under_point, narrow, sky_above};
 use tests::material::Material;
 use tests::rendering::{BuiltScene, Job, Rendering};
 use tests::scene_builder::{Camera, MaterialId, SceneBuilder};
@@ -13,32 +16,6 @@ use tests::statistics::{Estimate, spread, z_scores};
 const EYE_PIPELINES: [&str; 2] = ["nee", "pt"];
 /// All pipelines.
 const PIPELINES: [&str; 3] = ["nee", "pt", "lt"];
-/// Rounding of f32 radiance and of tessellated shapes, as a share of the value.
-const FLOOR: f64 = 3e-4;
-
-fn grey(value: f64) -> Material {
-    Material::lambert("grey", [value; 3])
-}
-
-/// The mean of the image is `expected`: within 4.5 standard errors, which must be below 0.5 % for the test to mean anything.
-#[track_caller]
-fn assert_mean(rendering: &Rendering, expected: f64, what: &str) {
-    let estimate = rendering.pixels.mean_estimate();
-    assert_eq!(rendering.rejected, 0, "{what}: rejected contributions");
-    assert_estimate(estimate, expected, what);
-}
-
-#[track_caller]
-fn assert_estimate(estimate: Estimate, expected: f64, what: &str) {
-    let z = estimate.z(&Estimate::exact(expected), FLOOR * expected);
-    assert!(estimate.error <= 0.005 * expected, "{what}: {estimate:?} is too noisy to test {expected}");
-    assert!(z.abs() < 4.5, "{what}: {estimate:?}, expected {expected}, z = {z:.2}");
-}
-
-/// Looks at a point through a field of view so narrow that radiance is constant over the image.
-fn narrow(eye: DVec3, target: DVec3) -> Camera {
-    Camera { eye, target, yfov: 0.1, aspect: 1.0 }
-}
 
 /// A grey floor seen in its centre from the side, below a height of 0.6 m.
 fn floor_seen_in_its_centre(albedo: f64) -> SceneBuilder {
@@ -56,11 +33,7 @@ fn render_small(job: Job, pipeline: &str, edges: u32, samples: u32) -> Rendering
 /// Check 2: a convex Lambert object in a constant sky of radiance 1 has radiance rho.
 #[test]
 fn convex_lambert_object_in_a_constant_sky() {
-    let mut scene = SceneBuilder::new();
-    let material = scene.material(grey(0.5));
-    scene.mesh(material, sphere(DVec3::ZERO, 1.0, 16).flat());
-    scene.camera("main", Camera { eye: DVec3::Z * 5.0, target: DVec3::ZERO, yfov: 15.0, aspect: 1.0 });
-    let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
+    let scene = ball_in_a_constant_sky(grey(0.5), 15.0);
     for (pipeline, samples) in [("nee", 512), ("pt", 512), ("lt", 2048)] {
         let rendering = render_small(scene.job(), pipeline, 4, samples);
         assert_mean(&rendering, 0.5, pipeline);
@@ -70,11 +43,7 @@ fn convex_lambert_object_in_a_constant_sky() {
 /// Check 2: with rho = 1 the object cannot be told from the sky behind it, at its rim neither.
 #[test]
 fn white_object_in_a_constant_sky_cannot_be_seen() {
-    let mut scene = SceneBuilder::new();
-    let material = scene.material(grey(1.0));
-    scene.mesh(material, sphere(DVec3::ZERO, 1.0, 16).flat());
-    scene.camera("main", Camera { eye: DVec3::Z * 5.0, target: DVec3::ZERO, yfov: 30.0, aspect: 1.0 });
-    let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
+    let scene = ball_in_a_constant_sky(grey(1.0), 30.0);
     for (pipeline, samples) in [("nee", 256), ("pt", 256), ("lt", 2048)] {
         let rendering = render_small(scene.job(), pipeline, 4, samples);
         assert_mean(&rendering, 1.0, pipeline);
@@ -89,11 +58,7 @@ fn white_object_in_a_constant_sky_cannot_be_seen() {
 /// Check 2: glass loses nothing, so that a glass sphere in a constant sky of radiance 1 cannot be seen.
 #[test]
 fn glass_sphere_in_a_constant_sky() {
-    let mut scene = SceneBuilder::new();
-    let glass = scene.material(Material::glass("glass", 1.5, 0.0));
-    scene.mesh(glass, sphere(DVec3::ZERO, 1.0, 16).flat());
-    scene.camera("main", Camera { eye: DVec3::Z * 5.0, target: DVec3::ZERO, yfov: 30.0, aspect: 1.0 });
-    let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
+    let scene = ball_in_a_constant_sky(Material::glass("glass", 1.5, 0.0), 30.0);
     // The flat faces keep some walks inside for long: after 64 edges 0.3 % of the light of the image is still in there.
     let rendering = render_small(scene.job(), "pt", 250, 256);
     assert_mean(&rendering, 1.0, "glass sphere");
@@ -120,16 +85,7 @@ fn spot_light_over_a_plane() {
     let scene = BuiltScene::new(&scene, None);
     for pipeline in PIPELINES {
         let rendering = FROM_ABOVE.job(&scene, pipeline).render();
-        for (index, estimate) in rendering.pixels.estimates().iter().enumerate().step_by(3) {
-            let (nearest, farthest) = FROM_ABOVE.distances(index / 3);
-            if farthest < inner.tan() {
-                let expected = FROM_ABOVE.pixel_mean(index / 3, |place| lambert_under_point(0.5, 1.0, place));
-                let z = estimate.z(&Estimate::exact(expected), 1e-3 * expected);
-                assert!(z.abs() < 6.0, "{pipeline}, pixel {}: {estimate:?}, expected {expected}", index / 3);
-            } else if nearest > outer.tan() {
-                assert_eq!(estimate.mean, 0.0, "{pipeline}, pixel {}: light outside the cone", index / 3);
-            }
-        }
+        FROM_ABOVE.assert_below_a_spot(&rendering, 0.5, [inner, outer], pipeline);
     }
 }
 
@@ -137,28 +93,11 @@ fn spot_light_over_a_plane() {
 #[test]
 fn splats_land_where_the_camera_projects() {
     let (x, z) = (0.3137, -0.2219);
-    let View { half, pixels, .. } = FROM_ABOVE;
     let mut scene = FROM_ABOVE.floor(0.5, 20.0);
     scene.spot_light(dvec3(x, 1.0, z), DVec3::NEG_Y, [1.0; 3], 0.25, 0.32);
     let scene = BuiltScene::new(&scene, None);
     let rendering = FROM_ABOVE.job(&scene, "lt").samples(4096).render();
-    let mut sums = [0.0; 3];
-    for (index, pixel) in rendering.pixels.rgb.iter().enumerate() {
-        let weight = f64::from(pixel[0]);
-        sums[0] += weight;
-        sums[1] += weight * ((index as u32 % pixels) as f64 + 0.5);
-        sums[2] += weight * ((index as u32 / pixels) as f64 + 0.5);
-    }
-    let scale = f64::from(pixels) / (2.0 * half);
-    let expected = [(z + half) * scale, (half - x) * scale];
-    for axis in 0..2 {
-        let found = sums[1 + axis] / sums[0];
-        assert!(
-            (found - expected[axis]).abs() < 0.01,
-            "axis {axis}: centroid at {found}, projected to {}",
-            expected[axis]
-        );
-    }
+    FROM_ABOVE.assert_centroid(&rendering, [x, z]);
 }
 
 /// Check 14: an out-of-focus plane looks the same through a thin lens from the camera and from the light.
@@ -286,12 +225,7 @@ fn sphere_light_over_a_plane() {
 #[test]
 fn furnace() {
     for pipeline in ["pt", "lt"] {
-        let mut scene = SceneBuilder::new();
-        let walls = scene.material(Material { emission: [1.0; 3], ..grey(0.8) });
-        scene.room(walls, DVec3::splat(-1.0), DVec3::splat(1.0));
-        scene.camera("main", Camera { eye: dvec3(0.1, 0.2, 0.3), target: DVec3::Z * -1.0, yfov: 60.0, aspect: 1.0 });
-        let scene = BuiltScene::new(&scene, None);
-        let rendering = render_small(scene.job(), pipeline, 5, 1024);
+        let rendering = render_small(furnace_room(0.8).job(), pipeline, 5, 1024);
         assert_mean(&rendering, 3.3616, pipeline);
     }
 }
@@ -356,28 +290,6 @@ fn floor_inside_rough_glass_under_a_sky() {
     assert!(z.abs() < 4.5, "pt {from_camera:?}, lt {from_light:?}");
 }
 
-/// A sky of radiance 1 above the horizon. The row of texels that is blurred into the black below it brings 1e-4 of the light.
-fn sky_above() -> Sky {
-    Sky::from_directions(8, 128, |towards| [if towards.y > 0.0 { 1.0 } else { 0.0 }; 3])
-}
-
-/// A floor between black walls under a lid of glass at height 1, above the camera.
-fn floor_below_glass(roughness: f64) -> SceneBuilder {
-    let mut scene = FROM_BELOW_THE_LIGHT.floor(0.5, 3.0);
-    let glass = scene.material(Material::glass("glass", 1.5, roughness));
-    let black = scene.material(grey(0.0).two_sided());
-    scene.floor(glass, 1.0, 3.0);
-    for (corner, edge) in [
-        (dvec3(-1.5, 0.0, -1.5), DVec3::X),
-        (dvec3(-1.5, 0.0, 1.5), DVec3::X),
-        (dvec3(-1.5, 0.0, -1.5), DVec3::Z),
-        (dvec3(1.5, 0.0, -1.5), DVec3::Z),
-    ] {
-        scene.quad(black, corner, edge * 3.0, DVec3::Y);
-    }
-    scene
-}
-
 /// Check 15: a slab of glass at normal incidence lets 1 - 2F/(1+F) = .9230769 through; the factor eta^2 cancels.
 #[test]
 fn slab_of_glass_over_an_emitter() {
@@ -399,20 +311,6 @@ fn lambert_under_a_smooth_coat() {
     }
 }
 
-/// Edge of what stands for an infinite plane, metres.
-const WIDE: f64 = 400.0;
-
-/// The upper face of a body of glass at height 0, and a floor inside the glass.
-fn glass_over_a_floor(floor: Material, height: f64, camera: Camera) -> SceneBuilder {
-    let mut scene = SceneBuilder::new();
-    let glass = scene.material(Material::glass("glass", 1.5, 0.0));
-    let floor = scene.material(floor);
-    scene.floor(glass, 0.0, WIDE);
-    scene.floor(floor, height, WIDE);
-    scene.camera("main", camera);
-    scene
-}
-
 /// Fresnel reflectance for unpolarised light that meets a surface from inside glass, below the critical angle.
 fn fresnel_inside(degrees: f64, eta: f64) -> f64 {
     let (sin, cos) = degrees.to_radians().sin_cos();
@@ -420,98 +318,4 @@ fn fresnel_inside(degrees: f64, eta: f64) -> f64 {
     let perpendicular = (eta * cos - cos_out) / (eta * cos + cos_out);
     let parallel = (cos - eta * cos_out) / (cos + eta * cos_out);
     (perpendicular.powi(2) + parallel.powi(2)) / 2.0
-}
-
-/// A camera that looks straight down on a floor: its right is +Z, its up is +X.
-#[derive(Clone, Copy)]
-struct View {
-    /// Of the camera above the floor, metres.
-    height: f64,
-    /// Half of the edge of the square that it sees, metres.
-    half: f64,
-    /// Along an edge of the image.
-    pixels: u32,
-}
-
-/// From above the lights at height 1.
-const FROM_ABOVE: View = View { height: 4.0, half: 0.8, pixels: 32 };
-/// From below them, so that lights with an area are not in the way.
-const FROM_BELOW_THE_LIGHT: View = View { height: 0.8, half: 0.4, pixels: 16 };
-
-impl View {
-    /// A grey floor of a given edge under the camera.
-    fn floor(self, albedo: f64, edge: f64) -> SceneBuilder {
-        let mut scene = SceneBuilder::new();
-        let floor = scene.material(grey(albedo));
-        scene.floor(floor, 0.0, edge);
-        let yfov = 2.0 * (self.half / self.height).atan().to_degrees();
-        scene.camera("main", Camera { eye: DVec3::Y * self.height, target: DVec3::ZERO, yfov, aspect: 1.0 });
-        scene
-    }
-
-    fn job(self, scene: &BuiltScene, pipeline: &str) -> Job {
-        scene.job().pipeline(pipeline).edges(2).size(self.pixels, self.pixels).samples(1024)
-    }
-
-    /// The mean over a pixel of a function of the place on the floor, by 8 x 8 midpoints.
-    fn pixel_mean(self, pixel: usize, value: impl Fn(DVec2) -> f64) -> f64 {
-        let points = self.points(pixel, 8);
-        points.iter().map(|point| value(*point)).sum::<f64>() / points.len() as f64
-    }
-
-    /// Midpoints (z, -x) of `steps` x `steps` parts of a pixel.
-    fn points(self, pixel: usize, steps: u32) -> Vec<DVec2> {
-        let side = 2.0 * self.half / f64::from(self.pixels);
-        let corner = DVec2::new((pixel as u32 % self.pixels).into(), (pixel as u32 / self.pixels).into());
-        let part = |i: u32| DVec2::new((i % steps).into(), (i / steps).into()) + 0.5;
-        (0..steps * steps).map(|i| (corner + part(i) / f64::from(steps)) * side - self.half).collect()
-    }
-
-    /// Bounds on the distance from the origin over a pixel, a little wide.
-    fn distances(self, pixel: usize) -> (f64, f64) {
-        let side = 2.0 * self.half / f64::from(self.pixels);
-        let centre = self.points(pixel, 1)[0].length();
-        (centre - side, centre + side)
-    }
-
-    /// Every pixel is as expected: the rule for z-scores, with 1e-3 for rounding and tessellation.
-    #[track_caller]
-    fn assert_pixels(self, rendering: &Rendering, value: impl Fn(DVec2) -> f64, what: &str) {
-        assert_eq!(rendering.rejected, 0, "{what}: rejected contributions");
-        let expected: Vec<f64> = (0..rendering.pixels.rgb.len()).map(|pixel| self.pixel_mean(pixel, &value)).collect();
-        // The image is grey: its channels are one number, not three.
-        let estimates = rendering.pixels.estimates();
-        let of_pixel =
-            |(estimate, expected): (&Estimate, &f64)| estimate.z(&Estimate::exact(*expected), 1e-3 * expected);
-        let scores: Vec<f64> = estimates.iter().step_by(3).zip(&expected).map(of_pixel).collect();
-        let spread = spread(&scores);
-        assert!(spread.agrees(), "{what}: {spread:?}");
-        assert_estimate(
-            rendering.pixels.mean_estimate(),
-            expected.iter().sum::<f64>() / expected.len() as f64,
-            &format!("{what}, whole image"),
-        );
-    }
-}
-
-/// Radiance of a Lambert floor at a place under a point light of 1 W/sr above the origin.
-fn lambert_under_point(albedo: f64, height: f64, place: DVec2) -> f64 {
-    albedo / PI * height / (height * height + place.length_squared()).powf(1.5)
-}
-
-/// Form factor from a place on the floor to a parallel unit square at unit height above the origin: four rectangles with a corner
-/// above the place.
-fn factor_of_unit_square(place: DVec2) -> f64 {
-    let corner = |a: f64, b: f64| {
-        let (root_a, root_b) = (a.hypot(1.0), b.hypot(1.0));
-        (a / root_a * (b / root_a).atan() + b / root_b * (a / root_b).atan()) / TAU
-    };
-    let sides = |x: f64| [0.5 - x, 0.5 + x];
-    sides(place.x).iter().flat_map(|&a| sides(place.y).map(|b| corner(a, b))).sum()
-}
-
-/// Form factor to a parallel disk of radius 1 at unit height above the origin.
-fn factor_of_unit_disk(place: DVec2) -> f64 {
-    let d2 = place.length_squared();
-    (1.0 - d2 / ((d2 + 2.0).powi(2) - 4.0 * d2).sqrt()) / 2.0
 }

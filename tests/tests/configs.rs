@@ -41,7 +41,7 @@ fn every_pipeline_layout_and_schedule_renders_one_sample() {
     for layout in Axis::Layout.names() {
         assert!(rendered.contains(&("layout", layout)), "no pipeline fits layout `{layout}`");
     }
-    for started in ["lt", "nee", "pt", "rays"] {
+    for started in ["lt", "nee", "pt", "rays", "sbdpt", "sbdpt_seed"] {
         assert!(rendered.contains(&("pipeline", started)), "pipeline `{started}` is shipped and renders");
     }
 }

@@ -76,7 +76,7 @@ fn runtime_knows_no_stage_and_no_field_by_name() {
     let mut names = BTreeSet::new();
     for (_, text) in files_below("configs/pipelines", "toml") {
         let table: toml::Table = text.parse().expect("TOML");
-        for key in ["stages", "streams", "state"] {
+        for key in ["stages", "streams", "state", "tallies", "layers"] {
             if let Some(entries) = table.get(key).and_then(toml::Value::as_table) {
                 names.extend(entries.keys().cloned());
             }

@@ -82,7 +82,9 @@ fn every_pipeline_with_every_effect() {
 #[test]
 fn every_layout() {
     for layout in Axis::Layout.names() {
-        let generated = generate(selection("pt", layout, "wavefront", "f32", false));
+        // A layout that places fields by hand fits the pipeline that it was written for.
+        let pipeline = if layout == "seed_aos" { "sbdpt_seed" } else { "pt" };
+        let generated = generate(selection(pipeline, layout, "wavefront", "f32", false));
         insta::assert_snapshot!(format!("layout_{layout}"), text_of(&generated));
     }
 }

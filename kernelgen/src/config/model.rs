@@ -71,6 +71,8 @@ pub struct Pipeline {
     pub streams: IndexMap<String, Stream>,
     /// Tallies by name.
     pub tallies: IndexMap<String, Tally>,
+    /// Groups of layers by name.
+    pub layers: IndexMap<String, Layers>,
     /// Stages by name, in the order in which a round runs them.
     pub stages: IndexMap<String, Stage>,
 }
@@ -143,6 +145,19 @@ pub struct Tally {
     /// How many counters: an expression as `rounds`.
     pub size: Spanned<String>,
     /// What it counts.
+    pub doc: String,
+}
+
+/// A group of layers: further planes of the film, which stages add to by index.
+#[derive(Clone, Debug)]
+pub struct Layers {
+    /// Where its table stands.
+    pub span: Span,
+    /// How many layers: an expression as `rounds`.
+    pub size: Spanned<String>,
+    /// The tally whose realised rates the layers are divided by where they go into the picture; without one they do not.
+    pub correct: Option<Spanned<String>>,
+    /// What is in them.
     pub doc: String,
 }
 

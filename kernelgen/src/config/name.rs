@@ -25,10 +25,14 @@ const GENERATED: [&str; 16] = [
     "tally_rates",
 ];
 
+/// Built-in names that a declaration may hide: no stage can use the type, since all resources are buffers.
+const HIDEABLE: [&str; 1] = ["sampler"];
+
 /// K0114 when the key cannot name a declaration of the generated WGSL.
 pub fn check(what: &str, item: &Item<'_>, findings: &mut Findings) {
     let own = GENERATED.contains(&item.name).then_some("a name that the generator declares itself");
-    let built_in = BUILTIN_IDENTIFIERS.contains(&item.name).then_some("a built-in name of WGSL");
+    let built_in = BUILTIN_IDENTIFIERS.contains(&item.name) && !HIDEABLE.contains(&item.name);
+    let built_in = built_in.then_some("a built-in name of WGSL");
     refuse(what, item.name, item.key, own.or(built_in), findings);
 }
 

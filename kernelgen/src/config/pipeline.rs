@@ -1,7 +1,7 @@
-//! The pipeline axis: records, instances, streams, tallies, stages.
+//! The pipeline axis: records, instances, streams, tallies, layers, stages.
 
 use super::merge::AxisFile;
-use super::model::{Field, Pipeline, RayKind, Record, Stage, Stream, Tally};
+use super::model::{Field, Layers, Pipeline, RayKind, Record, Stage, Stream, Tally};
 use super::quantity::Quantity;
 use super::section::{Findings, Item, Section};
 use super::{name, param, suggest};
@@ -24,6 +24,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Pipe
         state: state(top, findings),
         streams: streams(top, findings),
         tallies: tallies(top, findings),
+        layers: layers(top, findings),
         stages: stages(top, findings),
     }
 }
@@ -178,6 +179,19 @@ fn tallies(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Tally
         tallies.insert(item.name.to_owned(), Tally { span: item.key, size, doc: doc(&section, findings) });
     }
     tallies
+}
+
+fn layers(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Layers> {
+    let mut layers = IndexMap::new();
+    for item in top.entries("layers", findings) {
+        name::check("group of layers", &item, findings);
+        let Some(section) = item.section(findings) else { continue };
+        section.allow(&["size", "correct", "doc"], findings);
+        let size = required_text(&section, "size", SIZE_HELP, findings);
+        let correct = section.get("correct").and_then(|correct| correct.text(findings));
+        layers.insert(item.name.to_owned(), Layers { span: item.key, size, correct, doc: doc(&section, findings) });
+    }
+    layers
 }
 
 const SIZE_HELP: &str = "say how many indices there are: `size = \"max_edges + 1\"`";

@@ -8,8 +8,19 @@ use crate::diagnostic::Diagnostic;
 use crate::source::{FileId, FileKind, Sources, Span};
 
 /// Tables of the root: a key that begins with one of them is complete.
-const ROOTS: [&str; 10] =
-    ["params", "features", "layout", "schedule", "precision", "records", "state", "streams", "tallies", "stages"];
+const ROOTS: [&str; 11] = [
+    "params",
+    "features",
+    "layout",
+    "schedule",
+    "precision",
+    "records",
+    "state",
+    "streams",
+    "tallies",
+    "layers",
+    "stages",
+];
 
 /// Overrides the merged tree with every `--set`, in order. Each becomes a text named `--set` in `sources`.
 pub fn apply(sources: &mut Sources, root: &mut Table, selection: &Selection, findings: &mut Findings) {

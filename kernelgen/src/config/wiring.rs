@@ -1,7 +1,7 @@
 //! Do the parts of a variant fit? Every name that one part says must exist in the other.
 
 use super::expression;
-use super::model::{Field, Layout, Pipeline, Placed, PlacedField, Tally, Variant};
+use super::model::{Field, Layers, Layout, Pipeline, Placed, PlacedField, Tally, Variant};
 use super::section::Findings;
 use super::suggest;
 use crate::diagnostic::Diagnostic;
@@ -19,6 +19,7 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
     check_stages(pipeline, findings);
     check_rounds(pipeline, findings);
     check_sizes(pipeline, findings);
+    check_corrections(pipeline, findings);
     check_generated(pipeline, findings);
     for stream in &variant.schedule.batch {
         check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
@@ -76,9 +77,45 @@ fn check_rounds(pipeline: &Pipeline, findings: &mut Findings) {
 }
 
 fn check_sizes(pipeline: &Pipeline, findings: &mut Findings) {
-    for size in pipeline.tallies.values().map(|tally| &tally.size).filter(|size| !is_missing(size)) {
+    let tallies = pipeline.tallies.values().map(|tally| &tally.size);
+    let layers = pipeline.layers.values().map(|layers| &layers.size);
+    for size in tallies.chain(layers).filter(|size| !is_missing(size)) {
         findings.extend(expression::evaluate_size(pipeline, size).err());
     }
+}
+
+/// Layers are corrected by a tally that has an index for each.
+fn check_corrections(pipeline: &Pipeline, findings: &mut Findings) {
+    for layers in pipeline.layers.values() {
+        let Some(correct) = &layers.correct else { continue };
+        match pipeline.tallies.get(&correct.value) {
+            Some(tally) => findings.extend(different_sizes(pipeline, layers, correct, tally)),
+            None => findings.push(unknown_tally(pipeline, correct)),
+        }
+    }
+}
+
+fn unknown_tally(pipeline: &Pipeline, name: &Spanned<String>) -> Diagnostic {
+    let tallies = pipeline.tallies.keys().map(String::as_str);
+    Diagnostic::error("K0223", format!("there is no tally `{}`", name.value))
+        .at(name.span, "no such tally")
+        .help(suggest::help(&name.value, "tallies", tallies))
+}
+
+fn different_sizes(
+    pipeline: &Pipeline,
+    layers: &Layers,
+    correct: &Spanned<String>,
+    tally: &Tally,
+) -> Option<Diagnostic> {
+    let size = expression::evaluate_size(pipeline, &layers.size).ok()?;
+    let counters = expression::evaluate_size(pipeline, &tally.size).ok()?;
+    (size != counters).then(|| {
+        Diagnostic::error("K0224", format!("{size} layers cannot be corrected by {counters} counters"))
+            .at(layers.size.span, format!("this is {size}"))
+            .also(tally.size.span, format!("the size of `{}` is {counters}", correct.value))
+            .help("give both the same size: layer i is corrected by counter i")
+    })
 }
 
 /// Functions of the generated modules must not be declared twice, nor be named as a parameter or a record.
@@ -86,7 +123,9 @@ fn check_generated(pipeline: &Pipeline, findings: &mut Findings) {
     let params = pipeline.params.iter().map(|(name, param)| (name.clone(), param.span));
     let records = pipeline.records.iter().map(|(name, record)| (name.clone(), record.span));
     let mut taken: IndexMap<String, Span> = params.chain(records).collect();
-    for (name, span) in pipeline.tallies.iter().flat_map(|(name, tally)| tally_functions(name, tally)) {
+    let tallies = pipeline.tallies.iter().flat_map(|(name, tally)| tally_functions(name, tally));
+    let layers = pipeline.layers.iter().map(|(name, layers)| (format!("splat_{name}"), layers.span));
+    for (name, span) in tallies.chain(layers) {
         if let Some(first) = taken.get(&name) {
             let twice = Diagnostic::error("K0115", format!("`{name}` would be declared twice"))
                 .at(span, format!("declares `{name}`"))

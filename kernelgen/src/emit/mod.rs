@@ -23,7 +23,7 @@ use crate::config::model::{Selection, Variant};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::layout::{self, Placement, StateLeaf};
 use crate::link::Modules;
-use crate::plan::{Plan, Tally};
+use crate::plan::{Layers, Plan, Tally};
 use crate::report::{self, Report};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexSet;
@@ -54,9 +54,10 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     check_names(&variant)?;
     let rounds = evaluate_rounds(&variant.pipeline).map_err(|finding| vec![finding])?;
     let tallies = tally::tallies(&variant.pipeline).map_err(|finding| vec![finding])?;
+    let layers = film::layers(&variant.pipeline, &tallies).map_err(|finding| vec![finding])?;
     let constants = modules::constants(&variant.pipeline, &variant.effects);
     let mut modules = modules_of(sources);
-    let outcomes = add_config_modules(sources, &mut modules, &variant, &tallies)?;
+    let outcomes = add_config_modules(sources, &mut modules, &variant, &tallies, &layers)?;
     let wiring = {
         let texts = Texts { sources, modules: &modules, constants: &constants, outcomes: &outcomes };
         wiring::wire(texts, &variant)?
@@ -67,7 +68,9 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     check_initialised(&wiring, &liveness, start)?;
     let placement = layout::assign(&variant, &liveness)?;
     let queues = queues(&wiring, &variant);
+    let layers = film::used(layers, &wiring.splats);
     add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues);
+    add_module(sources, &mut modules, "film", film::module(variant.schedule.accumulate, &layers));
     let leaves = leaves(&variant);
     let program = Program {
         variant: &variant,
@@ -79,6 +82,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
         constants: &constants,
         rounds,
         tallies: &tallies,
+        layers: &layers,
     };
     let built = program::build(sources, &mut modules, &program)?;
     let facts = wiring.stages.iter().map(|(name, stage)| (name.as_str(), &stage.facts));
@@ -114,6 +118,7 @@ fn add_config_modules(
     modules: &mut Modules,
     variant: &Variant,
     tallies: &[Tally],
+    layers: &[Layers],
 ) -> Result<IndexSet<String>, Vec<Diagnostic>> {
     let pipeline = &variant.pipeline;
     let outcomes = modules::outcome_names(pipeline, &imported_outcomes(sources, modules, variant));
@@ -128,7 +133,7 @@ fn add_config_modules(
         ("params", modules::params(&pipeline.params)),
         ("pass", modules::PASS.to_owned()),
         ("control", queue::control_module(&queues)),
-        ("film", film::module(variant.schedule.accumulate)),
+        ("film", film::module(variant.schedule.accumulate, layers)),
         ("streams", stream::analysis_module(pipeline)),
         ("tallies", tally::module(pipeline, tallies)),
     ];

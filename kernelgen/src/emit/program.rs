@@ -12,7 +12,7 @@ use crate::config::model::{Accumulate, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
 use crate::layout::{Placement, StateLeaf};
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
-use crate::plan::{Binding, Buffer, Counter, Kernel, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
+use crate::plan::{self, Binding, Buffer, Counter, Kernel, Layers, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexMap;
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,6 +28,7 @@ pub(super) struct Program<'a> {
     pub constants: &'a Constants,
     pub rounds: u32,
     pub tallies: &'a [Tally],
+    pub layers: &'a [Layers],
 }
 
 /// A plan and the effects that its kernels ask for.
@@ -286,6 +287,7 @@ impl Builder<'_> {
             program,
             counters: counters.collect(),
             tallies,
+            layers: self.program.layers.to_vec(),
             film: self.program.variant.schedule.accumulate,
             bytes_per_path: placement.bytes_per_path(),
             slots_per_grain: room::slots(self.program.wiring, &self.program.variant.schedule),
@@ -313,10 +315,11 @@ impl Builder<'_> {
         buffers
     }
 
-    /// The tallies, if a kernel counts or reads one.
+    /// The tallies, if a kernel counts or reads one, or layers are corrected by one.
     fn tallies(&self, buffers: &IndexMap<String, Buffer>) -> Vec<Tally> {
         let used = buffers.contains_key(tally::COUNTS) || buffers.contains_key(tally::RATES);
-        if used { self.program.tallies.to_vec() } else { Vec::new() }
+        let corrects = self.program.layers.iter().any(|group| group.correct.is_some());
+        if used || corrects { self.program.tallies.to_vec() } else { Vec::new() }
     }
 
     fn generated_buffers(&self) -> Vec<Buffer> {
@@ -329,7 +332,7 @@ impl Builder<'_> {
             .map(|table| buffer(&memory::buffer_name(table), Role::State, per_path(table.bytes_per_path())))
             .collect();
         let channel = if program.variant.schedule.accumulate == Accumulate::FixedI64 { 8 } else { 4 };
-        let film = Size { per_pixel: 3 * channel, ..Size::default() };
+        let film = Size { per_pixel: 3 * channel * u64::from(plan::planes(program.layers)), ..Size::default() };
         buffers.extend([
             buffer("queue", Role::Queue, per_path(4 * program.queues.stages.len() as u32)),
             buffer("control", Role::Control, fixed(4 * program.queues.control_words())),

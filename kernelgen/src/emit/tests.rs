@@ -449,3 +449,62 @@ fn wrong_tallies_are_refused() {
     assert_eq!(code("splat = { size = \"3\" }"), ["K0114"]);
     assert_eq!(code("bounce = { size = \"3\" }"), ["K0303"]);
 }
+
+/// The pipeline with layers and a tally, and a consumer that adds to layers.
+fn with_layers(declared: &str, used: &str) -> Result<Generated, Refusal> {
+    let pipeline = format!("{PIPELINE}\n[tallies]\nwalks = {{ size = \"max_edges + 1\" }}\n{declared}\n");
+    let imports = "import package::film::{splat_implicit, splat_strategies};\n";
+    let splat = "    splat(connection.pixel,";
+    let stages = format!("{imports}{}", STAGES.replace(splat, &format!("{used}{splat}")));
+    crate::generate(&sources(&pipeline, LAYOUT, &stages), &selection(&[]))
+}
+
+const LAYERS: &str = "[layers]\nstrategies = { size = \"2 * max_edges\" }\n\
+                      implicit = { size = \"max_edges + 1\", correct = \"walks\" }";
+
+fn layers(used: &str) -> Plan {
+    with_layers(LAYERS, used).unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan
+}
+
+#[test]
+fn layers_are_planes_behind_the_picture() {
+    let plan = layers("    splat_implicit(1u, connection.pixel, vec3r(1.0)); splat_strategies(0u, 0u, vec3r(1.0));\n");
+    let [strategies, implicit] = plan.layers.as_slice() else { panic!("{:?}", plan.layers) };
+    assert_eq!((strategies.name.as_str(), strategies.first, strategies.size), ("strategies", 1, 10));
+    assert_eq!((implicit.name.as_str(), implicit.first, implicit.size), ("implicit", 11, 6));
+    assert_eq!((strategies.correct, implicit.correct), (None, Some(0)));
+    assert_eq!(plan.tallies.len(), 1, "the runtime needs the tally that corrects, whether it is counted or not");
+    let film = plan.buffers.iter().find(|buffer| buffer.role == Role::Film).unwrap();
+    assert_eq!((plan.planes(), film.size.per_pixel), (17, 17 * 12));
+    let consumer = &kernel(&plan, "resolve_connection").module;
+    assert!(consumer.contains("let plane = 11u + min(index, 5u);"), "{consumer}");
+}
+
+#[test]
+fn layers_that_nothing_adds_to_take_no_space() {
+    let plan = layers("    splat_implicit(1u, connection.pixel, vec3r(1.0));\n");
+    assert_eq!(
+        plan.layers.iter().map(|group| (group.name.as_str(), group.first)).collect::<Vec<_>>(),
+        [("implicit", 1)]
+    );
+    let plan = layers("");
+    let film = plan.buffers.iter().find(|buffer| buffer.role == Role::Film).unwrap();
+    assert!(plan.layers.is_empty() && plan.tallies.is_empty() && film.size.per_pixel == 12);
+}
+
+#[test]
+fn wrong_layers_are_refused() {
+    let code = |declared: &str| {
+        let refusal = with_layers(declared, "    splat_implicit(0u, 0u, vec3r(1.0));\n").expect_err(declared);
+        assert!(refusal.diagnostics.iter().all(|finding| !finding.labels.is_empty() && !finding.help.is_empty()));
+        refusal.diagnostics.iter().map(|finding| finding.code).collect::<Vec<_>>()
+    };
+    assert_eq!(code("[layers]\nimplicit = { size = \"max_edge\" }"), ["K0116"]);
+    assert_eq!(code("[layers]\nimplicit = { size = \"3\", correct = \"walk\" }"), ["K0223"]);
+    assert_eq!(code("[layers]\nimplicit = { size = \"3\", correct = \"walks\" }"), ["K0224"]);
+    assert_eq!(code("[layers]\nimplicit = { size = \"3\", correct = 1 }"), ["K0106"]);
+    assert_eq!(code("[layers]\nimplicit = { size = \"3\", over = \"walks\" }"), ["K0102"]);
+    assert_eq!(code("[layers]\nimplicit = { correct = \"walks\" }"), ["K0112"]);
+    assert_eq!(code("[layers]\nim-plicit = { size = \"3\" }"), ["K0114"]);
+    assert_eq!(code("[layers]\na = { size = \"3\" }\n[records.splat_a]\nx = \"index\""), ["K0115"]);
+}

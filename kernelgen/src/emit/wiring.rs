@@ -35,6 +35,8 @@ pub(super) struct Wiring {
     pub warnings: Vec<Diagnostic>,
     /// Effects that a stage asks for: `HAS_SKY`.
     pub effects_seen: BTreeSet<String>,
+    /// Functions of the module `film` that a stage or a consumer calls.
+    pub splats: BTreeSet<String>,
 }
 
 /// A stage.
@@ -243,6 +245,8 @@ impl Wirer<'_> {
         let facts = analyze::stage_facts(&module, &linked, &entry.name, bind, &outcomes.collect())?;
         let pruned = linked.constants_seen.iter().any(|name| self.is_absent(name));
         self.wiring.effects_seen.extend(linked.constants_seen);
+        let of_film = linked.items.into_iter().filter(|(module, _)| module == "film");
+        self.wiring.splats.extend(of_film.map(|(_, item)| item));
         Ok(Analysed { entry, signature, facts, pruned })
     }
 
@@ -356,19 +360,17 @@ impl Wirer<'_> {
 
 /// K0222: not even the fewest slots of a pass find room for the records of a round.
 fn check_room(variant: &Variant, name: &str, stream: &Stream, most: u32) -> Result<(), Vec<Diagnostic>> {
-    let schedule = &variant.schedule;
-    if room::records(schedule) >= most {
+    let capacity = &variant.schedule.capacity;
+    let records = room::records(&variant.schedule);
+    if records >= most {
         return Ok(());
     }
     let least = f64::from((1000 * most).div_ceil(SLOT_GRAIN)) / 1000.0;
     let message = format!("stream `{name}` has no room for the records of a round");
     Err(vec![
         Diagnostic::error("K0222", message)
-            .at(
-                schedule.capacity.span,
-                format!("less than one record for {SLOT_GRAIN} path slots, or than a path needs"),
-            )
-            .also(stream.span, format!("a path pushes up to {most} of them in a round"))
+            .at(capacity.span, format!("room for {records} in {SLOT_GRAIN} path slots"))
+            .also(stream.span, format!("one path can push {most} in a round"))
             .help(format!("write a capacity of {least} or more")),
     ])
 }

@@ -268,10 +268,12 @@ pub fn generate(sources: &Sources, selection: &Selection) -> Result<Generated, F
 /// Resolves and generates the variant of the settings.
 ///
 /// # Errors
-/// User input for unknown names, refused for the generator's diagnostics.
+/// User input for unknown names and for layers that the variant does not have, refused for the generator's diagnostics.
 pub fn generate_settings(settings: &mut RenderFile, effects: Effects) -> Result<Generated, Failure> {
     let mut library = Library::default();
     let selection = settings.selection(&mut library, effects)?;
     settings.pin(&selection, &library);
-    generate(&library.sources, &selection)
+    let generated = generate(&library.sources, &selection)?;
+    settings.check_layers(&generated.plan)?;
+    Ok(generated)
 }

@@ -6,16 +6,17 @@ use super::{Failure, print, print_json, progress, say};
 use clap::Args;
 use runtime::error::Error;
 use runtime::image_file::Image;
-use runtime::picture::{Exposure, to_srgb, write_png};
-use runtime::render::{Rendered, Session, Settings, Until};
+use runtime::output::save;
+use runtime::picture::Exposure;
+use runtime::render::{Session, Settings, Until};
 use runtime::scene::Accelerator;
-use runtime::settings::RenderFile;
+use runtime::settings::{Aov, RenderFile};
 use std::path::{Path, PathBuf};
 
 /// Samples per pixel when nothing says when to stop.
 const DEFAULT_SAMPLES: u32 = 64;
 
-/// Without arguments: path tracing of the shipped Cornell box.
+/// Without arguments: the flagship pipeline on the shipped Cornell box.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
     /// A pipeline (name or .toml file), a render file, or a rendered .exr, whose picture is rendered again
@@ -45,7 +46,8 @@ pub struct Arguments {
     /// Continue a picture where it was stopped
     #[arg(long, value_name = "PICTURE.exr", conflicts_with_all = ["scene", "camera", "size", "env", "env_scale", "env_rotate", "seed", "set"])]
     resume: Option<PathBuf>,
-    /// Further layers: `variance` writes standard errors as sem.R, sem.G, sem.B
+    /// Further layers: `variance` writes standard errors as sem.R, sem.G, sem.B; `strategies` a picture of each strategy (s, t), weighted
+    /// and unweighted, and the pyramids of them as PNG
     #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
     aov: Vec<String>,
     /// Brightness of the PNG in stops, 1 being white; by default the 95th percentile of the luminance is white
@@ -69,7 +71,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let earlier = arguments.resume.as_deref().map(input::of_picture).transpose()?;
     let mut settings = chosen(arguments, earlier.as_ref().map(|(settings, _)| settings))?;
-    let variance = settings.wants_variance()?;
     let until = until(arguments, &settings);
     let output = output(arguments, &settings)?;
 
@@ -87,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let mut session = Session::new(&gpu, &generated.plan, &|name| scene.resource(name), render, work)?;
     if let Some((before, image)) = &earlier {
-        resume(&mut session, before, image, until, variance)?;
+        resume(&mut session, before, image, until, settings.wants(Aov::Variance))?;
     }
     progress::catch_interrupts()?;
     let bar = progress::bar();
@@ -100,7 +101,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let rendered = session.picture()?;
     let metadata = settings.of_rendered(&rendered, until);
-    let outputs = write(&output, &rendered, &metadata, variance, arguments.exposure)?;
+    if settings.wants(Aov::Variance) && rendered.standard_error.is_none() {
+        super::warn("one sample per pixel gives no standard errors: no `sem` layers are written");
+    }
+    let exposure = arguments.exposure.map_or(Exposure::Percentile, |stops| Exposure::Stops(stops as f32));
+    let outputs = save(&output, &rendered, &metadata, exposure)?;
     if progress::interrupted() {
         say(&format!(
             "stopped at {} samples per pixel; continue with `pathloom render --resume {}`",
@@ -132,9 +137,16 @@ fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>) -> Result<RenderF
     let mut settings = arguments.scene.over(arguments.axes.over(file));
     settings.seed = arguments.seed.or(settings.seed);
     if !arguments.aov.is_empty() {
-        settings.aov.clone_from(&arguments.aov);
+        settings.aov = arguments.aov.iter().map(|word| layer(word)).collect::<Result<_, _>>()?;
     }
     Ok(input::with_default_scene(settings.with_defaults()))
+}
+
+fn layer(word: &str) -> Result<Aov, Error> {
+    Aov::ALL.into_iter().find(|layer| layer.to_string() == word).ok_or_else(|| {
+        let names = Aov::ALL.map(|layer| format!("`{layer}`")).join(" and ");
+        Error::input(format!("--aov {word}: there is no such layer")).help(format!("the layers are {names}"))
+    })
 }
 
 fn until(arguments: &Arguments, settings: &RenderFile) -> Until {
@@ -193,26 +205,4 @@ fn resume(
     let mut totals = image.totals(state.samples, state.batches);
     totals.tallied.clone_from(&state.tallies);
     session.resume(&totals)
-}
-
-fn write(
-    path: &Path,
-    rendered: &Rendered,
-    metadata: &RenderFile,
-    errors: bool,
-    exposure: Option<f64>,
-) -> Result<Vec<PathBuf>, Error> {
-    if errors && rendered.standard_error.is_none() {
-        super::warn("one sample per pixel gives no standard errors: no `sem` layers are written");
-    }
-    let image = rendered.image(metadata, errors)?;
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)
-            .map_err(|error| Error::failed(format!("cannot make the folder: {error}")).in_file(folder))?;
-    }
-    image.save(path)?;
-    let png = path.with_extension("png");
-    let exposure = exposure.map_or(Exposure::Percentile, |stops| Exposure::Stops(stops as f32));
-    write_png(&png, rendered.size, &to_srgb(&rendered.mean, exposure.factor(&rendered.mean)))?;
-    Ok(vec![path.to_path_buf(), png])
 }

@@ -94,6 +94,7 @@ fn plan(film: Accumulate) -> Plan {
         ],
         counters: vec![counter("rays_primary", 1), counter("rays_visibility", 2), counter("overflow", 4)],
         tallies: Vec::new(),
+        layers: Vec::new(),
         film,
         bytes_per_path: 4,
         slots_per_grain: SLOT_GRAIN,

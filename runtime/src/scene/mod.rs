@@ -5,6 +5,7 @@
 
 mod accessor;
 mod alias;
+mod blue_noise;
 mod bvh;
 mod camera;
 mod document;

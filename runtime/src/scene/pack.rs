@@ -1,6 +1,7 @@
 //! The scene as the kernels read it: little-endian 32-bit words, as `stages/wgsl/scene` declares them.
 
 use super::alias;
+use super::blue_noise;
 use super::light::{Light, Shape};
 use super::material::Material;
 use super::texture::{Slot, Wrap};
@@ -15,7 +16,7 @@ const NO_LIGHT: u32 = u32::MAX;
 /// Smallest resource, bytes: an empty binding is not legal.
 const LEAST_BYTES: usize = 16;
 
-/// Names of all resources.
+/// Names of the tables that describe a scene. `blue_noise` is a resource beside them.
 pub const RESOURCES: [&str; 16] = [
     "bvh_nodes",
     "bvh2_nodes",
@@ -40,6 +41,9 @@ pub type Packed = [OnceLock<Vec<u8>>; RESOURCES.len()];
 
 /// The bytes of a resource; `None` for an unknown name and for a hierarchy that the kernels do not read or cannot traverse.
 pub fn resource<'a>(scene: &'a Scene, name: &str) -> Option<&'a [u8]> {
+    if name == "blue_noise" {
+        return Some(blue_noise::bytes());
+    }
     let other_hierarchy = match scene.accelerator {
         Accelerator::Cwbvh => "bvh2_nodes",
         Accelerator::Bvh2 => "bvh_nodes",

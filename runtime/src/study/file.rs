@@ -3,7 +3,7 @@
 use crate::configs::{Axis, Library, is_path, scene_names, unknown};
 use crate::error::Error;
 use crate::render::Until;
-use crate::settings::RenderFile;
+use crate::settings::{Aov, RenderFile};
 use kernelgen::config::model::Effects;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -276,6 +276,10 @@ impl Wanted {
         self.settings.pin(&selection, &library);
         self.settings.doc = None;
         self.settings.seed = Some(self.settings.seed.unwrap_or(0).wrapping_add(repeat));
+        if !self.settings.wants(Aov::Variance) {
+            // z-scores weigh differences against the noise.
+            self.settings.aov.push(Aov::Variance);
+        }
         if self.seconds.is_none() {
             self.settings.spp.get_or_insert(DEFAULT_SAMPLES);
         }

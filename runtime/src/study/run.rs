@@ -10,7 +10,8 @@ use crate::device::Gpu;
 use crate::error::Error;
 use crate::image_file::Image;
 use crate::measurements::Measurements;
-use crate::picture::{Exposure, to_srgb, write_png};
+use crate::output::{make_folder, save};
+use crate::picture::{Exposure, write_png};
 use crate::render::{Progress, Rendered, Session, Settings, Until};
 use crate::scene::{Accelerator, Scene};
 use crate::settings::RenderFile;
@@ -52,7 +53,7 @@ pub struct Outcome {
 /// User input for whatever the study names and is not there or is refused; failed when the device is lost or files cannot be written.
 pub fn run(study: &Study, folder: &Path, gpu: &Gpu, observer: &mut dyn Observer) -> Result<Outcome, Error> {
     let mut runner = Runner::new(study, folder, gpu, observer)?;
-    make_folder(&folder.join(PICTURES))?;
+    make_folder(folder)?;
     // What is going to be rendered anew must not pass for done when its picture is there and its numbers are not.
     runner.results().write(folder)?;
     for scene in study.scenes.iter().filter(|scene| scene.absence(&study.defaults).is_none()) {
@@ -277,9 +278,7 @@ impl<'a> Runner<'a> {
         }
         let rendered = session.picture()?;
         let metadata = settings.of_rendered(&rendered, until);
-        rendered.image(&metadata, true)?.save(path)?;
-        let exposure = Exposure::Percentile.factor(&rendered.mean);
-        write_png(&path.with_extension("png"), rendered.size, &to_srgb(&rendered.mean, exposure))?;
+        save(path, &rendered, &metadata, Exposure::Percentile)?;
         self.rendered += 1;
         let measured = Measurements::of(&rendered, &generated, gpu, &metadata);
         Ok(Some((rendered, measured)))
@@ -349,7 +348,6 @@ fn tasks_of<'a>(
         for variant in &study.variants {
             let wanted =
                 study.wanted(variant, scene, repeat).map_err(|error| error.at(format!("scene `{}`", scene.name)))?;
-            wanted.settings.wants_variance()?;
             let picture = picture_name(&scene.name, &variant.name, repeat);
             let same = |run: &&Run| run.wanted == wanted && run.picture == picture;
             let done = earlier.runs.iter().find(same).filter(|run| folder.join(&run.picture).is_file()).cloned();
@@ -399,17 +397,14 @@ fn work(until: Until) -> Option<u32> {
 fn generate(settings: &RenderFile, effects: Effects) -> Result<Generated, Error> {
     let mut library = Library::default();
     let selection = settings.selection(&mut library, effects)?;
-    kernelgen::generate(&library.sources, &selection)
-        .map_err(|refusal| Error::input(format!("the generator refuses it\n{}", refusal.render(false).trim_end())))
+    let generated = kernelgen::generate(&library.sources, &selection)
+        .map_err(|refusal| Error::input(format!("the generator refuses it\n{}", refusal.render(false).trim_end())))?;
+    settings.check_layers(&generated.plan)?;
+    Ok(generated)
 }
 
 fn mean(radiance: &[f32]) -> [f64; 3] {
     let pixels = (radiance.len() / 3).max(1) as f64;
     [0, 1, 2]
         .map(|channel| radiance.iter().skip(channel).step_by(3).map(|&value| f64::from(value)).sum::<f64>() / pixels)
-}
-
-fn make_folder(folder: &Path) -> Result<(), Error> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::failed(format!("cannot make the folder: {error}")).in_file(folder))
 }

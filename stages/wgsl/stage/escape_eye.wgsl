@@ -2,13 +2,12 @@ import package::real::{real, vec3r};
 import package::state::{Path, Walk};
 import package::outcome::ENDED;
 import package::features::HAS_SKY;
-import package::film::splat;
-import package::pass::path_pixel;
 import package::light::directional_light::pdf_disk;
 import package::light::sky::{sky_pdf_w, sky_radiance};
 import package::transport::advance::sums_of;
-import package::transport::recursive_mis::{join, scaled, weight_over};
-import package::transport::strategy::{implicit_counts, implicit_samples, is_used};
+import package::transport::implicit::add_implicit;
+import package::transport::recursive_mis::{join, scaled};
+import package::transport::strategy::{implicit_counts, is_used};
 
 /// Ends an eye walk in the sky: the implicit strategy for the light at infinity, weighted against sampling its direction.
 fn escape_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
@@ -22,8 +21,7 @@ fn escape_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
                 let sampled = select(0.0, pdf_sky, is_used(edges - 1u, 1u));
                 rivals = join(scaled(sampled, sums.a), scaled(pdf_sky * pdf_disk(), sums.b));
             }
-            let weight = weight_over(implicit_samples(edges), rivals);
-            splat(path_pixel(), eye.throughput * sky_radiance(eye.direction) * weight);
+            add_implicit(edges, eye.throughput * sky_radiance(eye.direction), rivals);
         }
     }
     return ENDED;

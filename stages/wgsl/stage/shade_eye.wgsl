@@ -3,8 +3,6 @@ import package::state::{Path, Walk};
 import package::outcome::{ENDED, SCATTERED};
 import package::params::max_edges;
 import package::features::HAS_AREA_LIGHT;
-import package::film::splat;
-import package::pass::path_pixel;
 import package::random::{DIMENSION_SCATTER, WALK_EYE, random4};
 import package::surface::surface::{NO_LIGHT, Surface};
 import package::surface::material::{emission_at, is_emissive, material_at};
@@ -13,8 +11,9 @@ import package::light::triangle_light::{emission_pdf_w, triangle_light_pdf_area}
 import package::transport::advance::{advance, meet, surface_cosine};
 import package::transport::connect::connect;
 import package::transport::dimension::eye_vertex;
-import package::transport::recursive_mis::{MisPartial, join, scaled, weight_over};
-import package::transport::strategy::{eye_joins, eye_limit, implicit_counts, implicit_samples, is_used};
+import package::transport::implicit::add_implicit;
+import package::transport::recursive_mis::{MisPartial, join, scaled};
+import package::transport::strategy::{eye_joins, eye_limit, implicit_counts, is_used};
 import package::transport::termination::survives;
 import package::transport::walk::{arrive, is_absorbed};
 
@@ -62,5 +61,5 @@ fn add_met_emission(eye: ptr<function, Walk>, surface: Surface, sums: MisPartial
         let sampled = select(0.0, pdf_area, is_used(s - 1u, 1u));
         rivals = join(scaled(sampled, sums.a), scaled(pdf_area * pdf_w, sums.b));
     }
-    splat(path_pixel(), eye.throughput * emission_at(surface) * weight_over(implicit_samples(s), rivals));
+    add_implicit(s, eye.throughput * emission_at(surface), rivals);
 }

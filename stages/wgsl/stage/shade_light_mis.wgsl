@@ -10,7 +10,7 @@ import package::bsdf::bsdf::{Bsdf, IMPORTANCE, bsdf_at, eval_bsdf, is_connectabl
 import package::camera::camera::connect_camera;
 import package::tallies::count_light_vertices;
 import package::transport::advance::{meet, set_sums, surface_cosine};
-import package::transport::direct::offer_particle;
+import package::transport::direct::offer_particle_strategy;
 import package::transport::recursive_mis::{MisPartial, closed_sum, scaled, weight_over};
 import package::transport::strategy::{eye_limit, implicit_term, is_used, light_joins};
 import package::transport::walk::arrive;
@@ -52,6 +52,7 @@ fn join_camera(light: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sums: M
     let rivals = closed_sum(sums, reverse_pdf, light_joins(t - 1u), implicit_term(t));
     let pdf_area = camera.importance * surface_cosine(surface, camera.direction);
     let weight = weight_over(1.0, scaled(pdf_area, rivals));
-    let contribution = light.throughput * scattered.value * (camera.importance * weight);
-    offer_particle(light, surface, segment_to_point(surface, camera.position), contribution, camera.pixel);
+    let unweighted = light.throughput * scattered.value * camera.importance;
+    let segment = segment_to_point(surface, camera.position);
+    offer_particle_strategy(light, surface, segment, unweighted * weight, unweighted, t, camera.pixel);
 }

@@ -1,14 +1,22 @@
 import package::state::{Path, Walk};
 import package::outcome::EMITTED;
+import package::params::{counting, counting_realised};
 import package::camera::camera::camera_pdf_w;
+import package::tallies::count_implicit_walks;
 import package::transport::advance::set_sums;
 import package::transport::dimension::eye_vertex;
 import package::transport::recursive_mis::{MisPartial, source};
+import package::transport::strategy::eye_limit;
 import package::transport::walk::begin_eye;
 
 /// Starts the eye walk that belongs to light vertex y_t, t = `path.light_length`, with random numbers of its own.
 fn start_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     path.eye_length = 0u;
+    if counting == counting_realised {
+        for (var edges = 1u; edges <= eye_limit(path.light_length); edges += 1u) {
+            count_implicit_walks(edges);
+        }
+    }
     let cosine = begin_eye(eye, eye_vertex(0u, path.light_length));
     var sums: MisPartial;
     // There is one light path a pixel: the particle strategy takes as many samples as the others.

@@ -3,7 +3,6 @@
 import package::real::{real, vec3r};
 import package::state::{Path, Walk};
 import package::features::{HAS_AREA_LIGHT, HAS_SKY};
-import package::pass::path_pixel;
 import package::surface::surface::{Surface, surface_on};
 import package::surface::material::material_at;
 import package::surface::spawn::{SHORTEST_LENGTH, segment_between};
@@ -11,8 +10,8 @@ import package::bsdf::bsdf::{Bsdf, IMPORTANCE, RADIANCE, bsdf_at, eval_bsdf, is_
 import package::light::emission::light_end;
 import package::light::light_vertex::{LightEnd, LightVertex};
 import package::transport::advance::{sums_of, surface_cosine};
-import package::transport::direct::offer;
-import package::transport::recursive_mis::{MisPartial, closed_sum, join, scaled, weight_over};
+import package::transport::direct::offer_strategy;
+import package::transport::recursive_mis::{MisPartial, SMALLEST_SUM, closed_sum, join, scaled, weight_over};
 import package::transport::strategy::{eye_joins, implicit_term, light_joins};
 
 /// The vertex of a light walk that an eye walk is joined to.
@@ -46,9 +45,10 @@ fn connect(eye: ptr<function, Walk>, light: ptr<function, Walk>, surface: Surfac
     let eye_sum = closed_sum(sums, reverse_pdf_bsdf(bsdf, outgoing, end.direction), eye_joins(s - 1u), 0.0);
     let eye_side = scaled(end.pdf * surface_cosine(surface, end.direction), eye_sum);
     let light_side = scaled(scattered.pdf * end.cosine, side.sum);
+    let transported = eye.throughput * scattered.value * light.throughput * end.value;
     let weight = weight_over(end.distance_squared, join(eye_side, light_side));
-    let contribution = eye.throughput * scattered.value * light.throughput * end.value * weight;
-    offer(eye, surface, end.segment, contribution, path_pixel());
+    let unweighted = transported / max(end.distance_squared, SMALLEST_SUM);
+    offer_strategy(eye, surface, end.segment, transported * weight, unweighted, s, t);
 }
 
 /// y_1; the strategy with fewer light vertices is the eye walk that hits the light.

@@ -1,5 +1,6 @@
 //! Which random numbers are for what: `random4(walk, vertex, dimension)`. Vertices count from the camera (0) on eye walks
-//! and from the emitter (1) on light walks; the two walks never share a number.
+//! and from the emitter (1) on light walks; the two walks never share a number. A vertex is a key below 2^20: a pipeline with several
+//! walks of a kind for each path adds to it which of them it is.
 //!
 //! | walk, vertex           | dimension            | x, y                          | z, w                        |
 //! |------------------------|----------------------|-------------------------------|-----------------------------|

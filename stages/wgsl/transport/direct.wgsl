@@ -2,6 +2,7 @@
 
 import package::real::{real, vec3r};
 import package::state::{Connection, Walk};
+import package::params::record_strategies;
 import package::features::HAS_ATTENUATION;
 import package::pass::path_pixel;
 import package::random::{DIMENSION_LIGHT, WALK_EYE, random4};
@@ -11,6 +12,7 @@ import package::surface::spawn::Segment;
 import package::light::light::sample_light;
 import package::light::light_sample::LightSample;
 import package::transport::dimension::random_extra;
+import package::transport::record::strategy_index;
 import package::transport::medium::{medium_after, transmittance};
 
 /// Draws the light for next-event estimation at surface vertex `vertex` of the eye walk.
@@ -28,15 +30,41 @@ fn offer_direct_light(walk: ptr<function, Walk>, surface: Surface, light: LightS
 /// Pushes a contribution to the path's own pixel that holds if `segment`, which starts at the walk's newest vertex `surface`, is
 /// free; absorbs along it. Black ones are not worth a ray.
 fn offer(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) {
-    if any(contribution != vec3r(0.0)) {
+    if !all(contribution == vec3r(0.0)) {
         push_connection(connection_of(walk, surface, segment, contribution, pixel));
     }
 }
 
 /// As `offer`, to a pixel that need not be the path's own.
 fn offer_particle(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, pixel: u32) {
-    if any(contribution != vec3r(0.0)) {
+    if !all(contribution == vec3r(0.0)) {
         push_particle(connection_of(walk, surface, segment, contribution, pixel));
+    }
+}
+
+/// As `offer`, for a strategy (s, t) of several; `unweighted` is what it would contribute alone.
+fn offer_strategy(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, unweighted: vec3r, s: u32, t: u32) {
+    if !all(contribution == vec3r(0.0)) {
+        var connection = connection_of(walk, surface, segment, contribution, path_pixel());
+        if record_strategies {
+            let attenuated = connection_of(walk, surface, segment, unweighted, path_pixel());
+            connection.unweighted = attenuated.contribution;
+            connection.strategy = strategy_index(s, t);
+        }
+        push_connection(connection);
+    }
+}
+
+/// As `offer_particle`, for the strategy (0, t).
+fn offer_particle_strategy(walk: ptr<function, Walk>, surface: Surface, segment: Segment, contribution: vec3r, unweighted: vec3r, t: u32, pixel: u32) {
+    if !all(contribution == vec3r(0.0)) {
+        var connection = connection_of(walk, surface, segment, contribution, pixel);
+        if record_strategies {
+            let attenuated = connection_of(walk, surface, segment, unweighted, pixel);
+            connection.unweighted = attenuated.contribution;
+            connection.strategy = strategy_index(0u, t);
+        }
+        push_particle(connection);
     }
 }
 

@@ -99,7 +99,7 @@ fn weight_over(own: real, sum: real) -> real {
         let largest = max(max(own, sum), SMALLEST_SUM);
         let x = own / largest;
         let y = sum / largest;
-        return x / (x * x + y * y) / largest;
+        return x / max(x * x + y * y, SMALLEST_SUM) / largest;
     }
     return 1.0 / max(own + sum, SMALLEST_SUM);
 }

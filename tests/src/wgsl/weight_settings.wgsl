@@ -1,0 +1,43 @@
+//! Parameters of weighting as variables, so that one kernel goes through all of them.
+
+import package::real::{real, vec4r};
+import package::math::elementary::power;
+
+var<private> mis: u32;
+var<private> counting: u32;
+var<private> early_end: bool;
+var<private> use_implicit: bool;
+var<private> use_explicit: bool;
+var<private> use_particle: bool;
+var<private> use_connection: bool;
+var<private> only_edges: u32;
+var<private> only_eye_vertices: u32;
+/// Share of light walks that an edge does not end.
+var<private> survival: real;
+/// Which subset of the strategies is on: 0 all, 1 by kind, 2 by the number of eye vertices.
+var<private> subset: u32;
+
+/// In place of what earlier samples counted.
+fn light_vertices_rate(t: u32) -> real {
+    return power(survival, real(t - 1u));
+}
+
+/// Settings for a path of `edges` edges: of weights and counting, and of the subset.
+fn draw_settings(edges: u32, a: vec4r, b: vec4r, c: vec4r) {
+    mis = u32(a.x * 3.0);
+    counting = u32(a.y * 3.0);
+    early_end = a.z < 0.5;
+    survival = min(0.05 + 1.2 * a.w, 1.0);
+    subset = u32(c.x * 3.0);
+    let all = subset == 0u;
+    use_implicit = all || b.x < 0.75;
+    use_explicit = all || b.y < 0.75;
+    use_particle = all || b.z < 0.75;
+    use_connection = all || b.w < 0.75;
+    only_edges = 0u;
+    if subset == 2u {
+        // Sometimes another length: then nothing may be found.
+        only_edges = select(edges, edges % 6u + 1u, c.y < 0.1);
+    }
+    only_eye_vertices = u32(c.z * 256.0);
+}

@@ -1,0 +1,643 @@
+//! Bidirectional path tracing: known answers in all and for every strategy alone, and the images of the pipelines that join no walks.
+//! The numbers are those of algorithm.md section 9.
+
+use glam::{DVec2, DVec3, dvec3};
+use std::f64::consts::PI;
+use std::sync::LazyLock;
+use tests::closed_form::{FROM_ABOVE, FROM_BELOW_THE_LIGHT, assert_mean, ball_in_a_constant_sky};
+use tests::closed_form::{factor_of_unit_disk, factor_of_unit_square, floor_below_glass, furnace as furnace_room};
+use tests::closed_form::{glass_over_a_floor, grey, lambert_under_point, narrow, sky_above};
+use tests::compared::{ball_beside_a_wall, beside_a_caustic, lamps, leaning_mirror, sun_and_sky};
+use tests::material::Material;
+use tests::rendering::{BuiltScene, Job, Rendering, shipped};
+use tests::scene_builder::{Camera, MaterialId, SceneBuilder};
+use tests::shape::{Mesh, disk, sphere, turned_cuboid};
+use tests::sky::Sky;
+use tests::statistics::{Estimate, Pixels, Spread, spread, z_scores};
+
+/// Pixels along an edge of a block whose mean is compared.
+const BLOCK: usize = 8;
+/// f32 sums of radiance, as a share of the value.
+const ROUNDING: f64 = 3e-4;
+
+fn sbdpt(job: &Job, edges: u32, samples: u32) -> Job {
+    job.clone().pipeline("sbdpt").edges(edges).samples(samples)
+}
+
+/// Paths of so many edges by the strategy with `eye_vertices` vertices from the camera, counted in full. At the greatest length all
+/// counts of implicit samples are one.
+fn alone(job: &Job, edges: u32, eye_vertices: u32, samples: u32) -> Job {
+    let job = sbdpt(job, edges, samples).set("mis", "none").set("counting", "first");
+    job.set("only_edges", edges).set("only_eye_vertices", 1u32 << eye_vertices)
+}
+
+/// Light vertices joined to the camera, and nothing else.
+fn particles(job: Job) -> Job {
+    job.set("use_implicit", false).set("use_explicit", false).set("use_connection", false)
+}
+
+/// Two renderings show the same image.
+#[track_caller]
+fn assert_agree(a: &Rendering, b: &Rendering, what: &str) {
+    assert_eq!((a.rejected, b.rejected), (0, 0), "{what}: rejected contributions");
+    assert_same(&a.pixels, &b.pixels, BLOCK, 0.01, what);
+}
+
+/// Block means and the mean of two images agree; the standard errors of the latter, as a share, are below `noise`. The channels of a
+/// block are no independent tests where light or surfaces are grey: the worst counts.
+#[track_caller]
+fn assert_same(a: &Pixels, b: &Pixels, block: usize, noise: f64, what: &str) {
+    let means = [a, b].map(Pixels::mean_estimate);
+    for mean in means {
+        assert!(mean.error <= noise * mean.mean, "{what}: {mean:?} is too noisy to test anything");
+    }
+    let blocks = worst_of_blocks(a, b, block);
+    assert!(blocks.agrees(), "{what}: blocks {blocks:?}");
+    let z = means[0].z(&means[1], ROUNDING * means[1].mean);
+    assert!(z.abs() < 4.0, "{what}: {:?} against {:?}", means[0], means[1]);
+}
+
+/// z-scores of blocks, of each that of its worst channel.
+fn worst_of_blocks(a: &Pixels, b: &Pixels, block: usize) -> Spread {
+    let scores = z_scores(&a.block_estimates(block), &b.block_estimates(block), ROUNDING);
+    let worst = |channels: &[f64]| channels.iter().fold(0.0, |worst: f64, score| worst.max(score.abs()));
+    spread(&scores.chunks_exact(3).map(worst).collect::<Vec<f64>>())
+}
+
+/// Two renderings differ in the mean by far more than noise, and by a twentieth at least.
+#[track_caller]
+fn assert_differ(a: &Rendering, b: &Rendering, what: &str) {
+    let (a, b) = (a.pixels.mean_estimate(), b.pixels.mean_estimate());
+    let apart = (a.mean - b.mean).abs();
+    assert!(a.z(&b, 0.0).abs() > 10.0 && apart > 0.05 * b.mean, "{what}: {a:?} against {b:?}");
+}
+
+/// Check 1: walls that emit 1 and reflect .8 give the sum of .8^i below the number of edges, whatever the weights.
+#[test]
+fn furnace() {
+    let scene = furnace_room(0.8);
+    let job = scene.job().size(20, 20);
+    for (edges, sum, mis, counting) in [
+        (1, 1.0, "balance", "measured"),
+        (2, 1.8, "balance", "measured"),
+        (5, 3.3616, "balance", "measured"),
+        (10, 4.463_13, "balance", "first"),
+        (3, 2.44, "power", "first"),
+        (3, 2.44, "average", "realised"),
+    ] {
+        let rendering = sbdpt(&job, edges, 64).set("mis", mis).set("counting", counting).render();
+        assert_mean(&rendering, sum, &format!("{edges} edges, {mis}, {counting}"));
+    }
+}
+
+/// Check 2: a convex Lambert object in a constant sky of radiance 1 has radiance rho.
+#[test]
+fn convex_lambert_object_in_a_constant_sky() {
+    let scene = ball_in_a_constant_sky(grey(0.5), 15.0);
+    assert_mean(&sbdpt(&scene.job().size(48, 48), 4, 32).render(), 0.5, "grey ball");
+}
+
+/// Check 2: with rho = 1 the object cannot be told from the sky behind it, at its rim neither.
+#[test]
+fn white_object_in_a_constant_sky_cannot_be_seen() {
+    let scene = ball_in_a_constant_sky(grey(1.0), 30.0);
+    let rendering = sbdpt(&scene.job().size(48, 48), 4, 32).render();
+    assert_mean(&rendering, 1.0, "white ball");
+    assert_same(&rendering.pixels, &Pixels::exact(48, 48, vec![[1.0; 3]; 48 * 48]), 6, 0.005, "white ball");
+}
+
+/// Check 2: glass loses nothing. Within 4 degrees of the centre of a ball all light that it reflects inside gets out in few bounces.
+#[test]
+fn glass_ball_in_a_constant_sky() {
+    let scene = ball_in_a_constant_sky(Material::glass("glass", 1.5, 0.0), 8.0);
+    assert_mean(&sbdpt(&scene.job().size(32, 32), 8, 32).render(), 1.0, "glass ball");
+}
+
+/// Check 3: a point light in the middle of a sphere. Every strategy that can see it gives rho^(k-1) I / (pi R^2) alone.
+#[test]
+fn every_strategy_alone_in_the_integrating_sphere() {
+    let scene = inside_a_sphere(grey(0.5), Some([1.0; 3]));
+    for (edges, radiance) in [(2, 0.159_154_9), (3, 0.079_577_5), (4, 0.039_788_7), (5, 0.019_894_4)] {
+        for eye_vertices in 0..edges {
+            assert_alone(&scene, edges, eye_vertices, radiance);
+        }
+    }
+}
+
+/// Check 3: the sum over lengths.
+#[test]
+fn integrating_sphere() {
+    let scene = inside_a_sphere(grey(0.5), Some([1.0; 3]));
+    assert_mean(
+        &sbdpt(&scene.job().size(32, 32), 5, 32).set("counting", "first").render(),
+        0.298_415_5,
+        "integrating sphere",
+    );
+}
+
+/// Checks 1 and 3: in a sphere that emits 1 and reflects .5 every strategy alone gives .5^(k-1), those that meet light included.
+#[test]
+fn every_strategy_alone_in_a_glowing_sphere() {
+    let scene = inside_a_sphere(Material { emission: [1.0; 3], ..grey(0.5) }, None);
+    for edges in 1..=3 {
+        for eye_vertices in u32::from(edges == 1)..=edges {
+            assert_alone(&scene, edges, eye_vertices, 0.5f64.powi(edges as i32 - 1));
+        }
+    }
+}
+
+/// A strategy alone shows the same radiance in every block, known to 1.5 % in the mean. In a sphere almost nothing but the places
+/// of splats is left to chance.
+#[track_caller]
+fn assert_alone(scene: &BuiltScene, edges: u32, eye_vertices: u32, radiance: f64) {
+    let size = if eye_vertices == 0 { 36 } else { 16 };
+    let rendering = alone(&scene.job().size(size, size), edges, eye_vertices, 32).render();
+    let what = format!("({eye_vertices}, {})", edges - eye_vertices);
+    let pixels = vec![[radiance as f32; 3]; rendering.pixels.rgb.len()];
+    let expected = Pixels::exact(size as usize, size as usize, pixels);
+    assert_eq!(rendering.rejected, 0, "{what}: rejected contributions");
+    assert_same(&rendering.pixels, &expected, BLOCK, 0.015, &what);
+}
+
+/// The inside of a sphere of facets with the area of the unit sphere, about a point light if that has an intensity.
+fn inside_a_sphere(material: Material, intensity: Option<[f64; 3]>) -> BuiltScene {
+    let mut scene = SceneBuilder::new();
+    let material = scene.material(material);
+    let mut mesh = sphere(DVec3::ZERO, 1.0, 24).inverted().flat();
+    let scale = (4.0 * PI / area(&mesh)).sqrt();
+    mesh.positions.iter_mut().for_each(|position| *position *= scale);
+    scene.mesh(material, mesh);
+    if let Some(intensity) = intensity {
+        scene.point_light(DVec3::ZERO, intensity);
+    }
+    scene.camera("main", Camera { eye: dvec3(0.3, 0.2, 0.1), target: DVec3::NEG_Z, yfov: 90.0, aspect: 1.0 });
+    BuiltScene::new(&scene, None)
+}
+
+fn area(mesh: &Mesh) -> f64 {
+    let corner = |index: u32| mesh.positions[index as usize];
+    let of_triangle = |i: &[u32]| (corner(i[1]) - corner(i[0])).cross(corner(i[2]) - corner(i[0])).length() / 2.0;
+    mesh.indices.chunks_exact(3).map(of_triangle).sum()
+}
+
+/// Checks 4 and 13: a point light over a plane, L = rho/pi I h/(h^2+r^2)^{3/2} at every pixel, by all strategies and by splats alone.
+#[test]
+fn point_light_over_a_plane() {
+    let mut scene = FROM_ABOVE.floor(0.5, 20.0);
+    scene.point_light(DVec3::Y, [1.0; 3]);
+    let scene = BuiltScene::new(&scene, None);
+    let job = FROM_ABOVE.job(&scene, "sbdpt").samples(192);
+    FROM_ABOVE.assert_pixels(&job.render(), |place| lambert_under_point(0.5, 1.0, place), "all strategies");
+    let splats = particles(job.samples(384)).render();
+    FROM_ABOVE.assert_pixels(&splats, |place| lambert_under_point(0.5, 1.0, place), "particles alone");
+}
+
+/// Check 5: the form factor of a parallel unit square at unit height.
+#[test]
+fn square_light_over_a_plane() {
+    assert_seen_from_below(|scene, light| scene.ceiling(light, 1.0, 1.0), factor_of_unit_square);
+}
+
+/// Check 6: the form factor of a parallel disk, E = pi Le a^2/(a^2+h^2) below its centre.
+#[test]
+fn disk_light_over_a_plane() {
+    let add = |scene: &mut SceneBuilder, light| scene.mesh(light, disk(DVec3::Y, DVec3::NEG_Y, 1.0, 128));
+    assert_seen_from_below(add, factor_of_unit_disk);
+}
+
+/// Check 6: E = pi Le (R/D)^2 cos below a sphere: R = .5, D = 2.
+#[test]
+fn sphere_light_over_a_plane() {
+    const RINGS: u32 = 48;
+    let slice = PI / f64::from(RINGS);
+    let same_area_seen_from_below = 0.5 * (slice / slice.sin()).sqrt();
+    let add =
+        |scene: &mut SceneBuilder, light| scene.mesh(light, sphere(DVec3::Y * 2.0, same_area_seen_from_below, RINGS));
+    assert_seen_from_below(add, |place| {
+        let distance = place.length().hypot(2.0);
+        (0.5 / distance).powi(2) * 2.0 / distance
+    });
+}
+
+/// Every pixel of a floor under a light of radiance 1, from below the light.
+#[track_caller]
+fn assert_seen_from_below(add: impl Fn(&mut SceneBuilder, MaterialId), factor: impl Fn(DVec2) -> f64) {
+    let mut scene = FROM_BELOW_THE_LIGHT.floor(0.5, 20.0);
+    let light = scene.material(Material::emitter("light", [1.0; 3]));
+    add(&mut scene, light);
+    let scene = BuiltScene::new(&scene, None);
+    let rendering = FROM_BELOW_THE_LIGHT.job(&scene, "sbdpt").samples(512).render();
+    FROM_BELOW_THE_LIGHT.assert_pixels(&rendering, |place| 0.5 * factor(place), "sbdpt");
+}
+
+/// Check 7: L = rho/pi E cos for a directional light.
+#[test]
+fn directional_light_on_a_plane() {
+    let cosine: f64 = 0.6;
+    let mut scene = FROM_ABOVE.floor(0.5, 2.0);
+    scene.directional_light(dvec3((1.0 - cosine * cosine).sqrt(), -cosine, 0.0), [2.0; 3]);
+    let scene = BuiltScene::new(&scene, None);
+    let rendering = FROM_ABOVE.job(&scene, "sbdpt").samples(256).render();
+    FROM_ABOVE.assert_pixels(&rendering, |_| 0.5 / PI * 2.0 * cosine, "sbdpt");
+}
+
+/// Check 7: inside its inner cone a spot light is a point light, outside its outer cone there is nothing at all: in all, and for every
+/// strategy alone.
+#[test]
+fn every_strategy_alone_under_a_spot_light() {
+    let (inner, outer) = (0.30, 0.45);
+    let mut scene = FROM_ABOVE.floor(0.5, 20.0);
+    scene.spot_light(DVec3::Y, DVec3::NEG_Y, [1.0; 3], inner, outer);
+    let scene = BuiltScene::new(&scene, None);
+    let job = scene.job().size(FROM_ABOVE.pixels, FROM_ABOVE.pixels);
+    FROM_ABOVE.assert_below_a_spot(&sbdpt(&job, 3, 64).render(), 0.5, [inner, outer], "all strategies");
+    for eye_vertices in [0, 1] {
+        let rendering = alone(&job, 2, eye_vertices, 128).render();
+        let what = format!("({eye_vertices}, {})", 2 - eye_vertices);
+        FROM_ABOVE.assert_below_a_spot(&rendering, 0.5, [inner, outer], &what);
+    }
+}
+
+/// Check 13: the centroid of a small lit spot is where the camera projects it, to a hundredth of a pixel.
+#[test]
+fn splats_land_where_the_camera_projects() {
+    let [x, z] = [0.3137, -0.2219];
+    let mut scene = FROM_ABOVE.floor(0.5, 20.0);
+    scene.spot_light(dvec3(x, 1.0, z), DVec3::NEG_Y, [1.0; 3], 0.15, 0.2);
+    let scene = BuiltScene::new(&scene, None);
+    let rendering = particles(FROM_ABOVE.job(&scene, "sbdpt")).samples(512).render();
+    FROM_ABOVE.assert_centroid(&rendering, [x, z]);
+}
+
+/// Check 14: an out-of-focus plane looks the same through a thin lens from the camera and from the light.
+#[test]
+fn thin_lens_over_a_lit_plane() {
+    let mut scene = FROM_ABOVE.floor(0.5, 20.0);
+    scene.spot_light(DVec3::Y, DVec3::NEG_Y, [1.0; 3], 0.2, 0.3);
+    let scene = BuiltScene::new(&scene, None);
+    // Not focused halfway, where a lens seen from the wrong end makes the same blur.
+    let job = FROM_ABOVE.job(&scene, "sbdpt").lens(0.3, 1.6).samples(384);
+    let from_camera = job.clone().set("use_particle", false).render();
+    let from_light = particles(job).render();
+    assert_same(&from_camera.pixels, &from_light.pixels, 4, 0.01, "lens");
+}
+
+/// Check 9: between diffuse plates every strategy alone gives the image of `pt` of its length.
+#[test]
+fn every_strategy_alone_gives_the_image_of_pt() {
+    let scene = between_plates();
+    let up_to = |edges: u32| plates_job(&scene, "pt", edges, 128).seed(edges).render();
+    let all = [up_to(1), up_to(2), up_to(3)];
+    for edges in 2..=4 {
+        let longest = if edges < 4 { &all[edges as usize - 1] } else { &*PLATES };
+        let expected = difference(&longest.pixels, &all[edges as usize - 2].pixels);
+        for eye_vertices in 0..=edges {
+            let samples = if [0, edges].contains(&eye_vertices) { 64 } else { 32 };
+            let rendering = alone(&plates_job(&scene, "sbdpt", edges, 0), edges, eye_vertices, samples).render();
+            let what = format!("({eye_vertices}, {})", edges - eye_vertices);
+            assert_same(&rendering.pixels, &expected, BLOCK, 0.03, &what);
+        }
+    }
+}
+
+/// A floor and a ceiling that do not touch, in the light of a panel between them and out of the picture, which reflects.
+fn between_plates() -> BuiltScene {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(Material::lambert("floor", [0.9, 0.7, 0.8]));
+    let ceiling = scene.material(Material::lambert("ceiling", [0.8, 0.9, 0.7]));
+    let light = scene.material(Material { emission: [4.0, 3.0, 2.0], ..grey(0.5) });
+    scene.floor(floor, 0.0, 2.4);
+    scene.ceiling(ceiling, 0.8, 2.4);
+    scene.quad(light, dvec3(-1.3, 0.1, -1.2), DVec3::Y * 0.6, DVec3::Z * 2.4);
+    scene.camera("main", Camera { eye: dvec3(0.0, 0.4, 3.0), target: dvec3(0.0, 0.4, 0.0), yfov: 16.0, aspect: 1.0 });
+    BuiltScene::new(&scene, None)
+}
+
+fn plates_job(scene: &BuiltScene, pipeline: &str, edges: u32, samples: u32) -> Job {
+    scene.job().pipeline(pipeline).size(40, 40).edges(edges).samples(samples)
+}
+
+/// The plates by `pt`, paths of up to four edges.
+static PLATES: LazyLock<Rendering> = LazyLock::new(|| plates_job(&between_plates(), "pt", 4, 256).seed(4).render());
+
+/// One image less another that is independent of it.
+fn difference(a: &Pixels, b: &Pixels) -> Pixels {
+    let join = |a: &[[f32; 3]], b: &[[f32; 3]], with: fn(f32, f32) -> f32| -> Vec<[f32; 3]> {
+        a.iter().zip(b).map(|(a, b)| std::array::from_fn(|i| with(a[i], b[i]))).collect()
+    };
+    Pixels { rgb: join(&a.rgb, &b.rgb, |a, b| a - b), errors: join(&a.errors, &b.errors, f32::hypot), ..*a }
+}
+
+/// Weights and counts of implicit samples.
+type Weights = (&'static str, &'static str);
+
+const BALANCE: Weights = ("balance", "measured");
+const FIRST: Weights = ("balance", "first");
+const POWER: Weights = ("power", "first");
+const AVERAGE: Weights = ("average", "realised");
+
+/// Renders by `sbdpt` with all these weights, by `pt` and, where it takes samples, by `lt`: the same image.
+#[track_caller]
+fn assert_pipelines_agree(job: &Job, weights: &[Weights], [ours, pt, lt]: [u32; 3]) {
+    let expected = job.clone().pipeline("pt").samples(pt).render();
+    for (mis, counting) in weights {
+        let job = job.clone().pipeline("sbdpt").set("mis", mis).set("counting", counting);
+        assert_agree(&job.samples(ours).render(), &expected, &format!("sbdpt ({mis}, {counting}) and pt"));
+    }
+    if lt > 0 {
+        assert_agree(&job.clone().pipeline("lt").samples(lt).render(), &expected, "lt and pt");
+    }
+}
+
+/// Check 10: an open scene in the light of a sun and of a sky.
+#[test]
+fn sbdpt_agrees_under_sun_and_sky() {
+    assert_pipelines_agree(&sun_and_sky().job().size(32, 32).edges(4), &[BALANCE, POWER, AVERAGE], [32, 64, 0]);
+}
+
+/// Check 10: one light of each kind.
+#[test]
+fn sbdpt_agrees_on_one_light_of_each_kind() {
+    let job = Job::of_file(shipped("light_kinds")).size(64, 40).edges(3);
+    assert_pipelines_agree(&job, &[BALANCE, POWER], [32, 96, 192]);
+}
+
+/// Check 10: a panel that emits from both sides and is in the picture, a point light and a spot light; through a lens.
+#[test]
+fn sbdpt_agrees_on_lamps_seen_through_a_lens() {
+    assert_pipelines_agree(&lamps().job().size(40, 40).edges(4).lens(0.1, 3.0), &[FIRST], [32, 64, 128]);
+}
+
+/// Check 10: lights without extent alone.
+#[test]
+fn sbdpt_agrees_on_delta_lights() {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(Material::lambert("floor", [0.6, 0.5, 0.4]));
+    let ball = scene.material(Material::glossy("ball", [0.5, 0.6, 0.7], 0.6));
+    scene.floor(floor, 0.0, 4.0);
+    scene.quad(floor, dvec3(-2.0, 0.0, -1.5), DVec3::X * 4.0, DVec3::Y * 2.0);
+    scene.mesh(ball, sphere(dvec3(0.3, 0.5, 0.0), 0.5, 12));
+    scene.point_light(dvec3(-0.8, 1.2, 0.4), [0.5, 1.0, 0.2]);
+    scene.spot_light(dvec3(1.2, 2.0, 0.8), dvec3(-0.5, -1.0, -0.4), [3.0, 2.0, 6.0], 0.3, 0.5);
+    scene.directional_light(dvec3(0.5, -1.0, -0.6), [0.7, 0.5, 0.4]);
+    scene.camera("main", Camera { eye: dvec3(0.0, 1.3, 4.0), target: dvec3(0.0, 0.6, 0.0), yfov: 36.0, aspect: 1.0 });
+    let scene = BuiltScene::new(&scene, None);
+    assert_pipelines_agree(&scene.job().size(56, 56).edges(4), &[FIRST], [32, 64, 128]);
+}
+
+/// Check 10: caustics of smooth glass.
+#[test]
+fn sbdpt_agrees_on_a_caustic_of_glass() {
+    let scene = beside_a_caustic(Material::glass("glass", 1.5, 0.0), sphere(dvec3(0.0, 0.6, 0.0), 0.4, 16).flat());
+    assert_pipelines_agree(&scene.job().size(64, 32).edges(5), &[BALANCE], [64, 256, 0]);
+}
+
+/// Check 10: caustics of a mirror whose normals lean.
+#[test]
+fn sbdpt_agrees_on_a_caustic_of_a_mirror() {
+    let scene = beside_a_caustic(Material::metal("mirror", [0.9, 0.8, 0.7], 0.0), leaning_mirror());
+    assert_pipelines_agree(&scene.job().size(64, 32).edges(4), &[FIRST, POWER], [64, 256, 0]);
+}
+
+/// Check 10: rough glass that absorbs, with smooth normals.
+#[test]
+fn sbdpt_agrees_on_rough_glass() {
+    let bottle = Some(([0.4, 0.7, 0.9], 0.5));
+    let scene = ball_beside_a_wall(Material { attenuation: bottle, ..Material::glass("glass", 1.5, 0.5) }, 8);
+    assert_pipelines_agree(&scene.job().size(72, 72).edges(4), &[FIRST, POWER], [32, 64, 0]);
+}
+
+/// Check 10: rough metal.
+#[test]
+fn sbdpt_agrees_on_rough_metal() {
+    let scene = ball_beside_a_wall(Material::metal("metal", [0.9, 0.7, 0.4], 0.4), 8);
+    assert_pipelines_agree(&scene.job().size(56, 56).edges(4), &[FIRST], [32, 64, 0]);
+}
+
+/// Check 12, the toy: a floor, a wall and a small bright panel, seen by a camera of 1.5 by 1 at unit distance.
+fn toy(sky: Option<&Sky>) -> BuiltScene {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(Material::lambert("floor", [0.7; 3]));
+    let wall = scene.material(Material::lambert("wall", [0.6; 3]));
+    let light = scene.material(Material::emitter("light", [12.0; 3]));
+    scene.floor(floor, 0.0, 4.0);
+    scene.quad(wall, dvec3(-2.0, 0.0, -1.2), DVec3::X * 4.0, DVec3::Y * 1.5);
+    scene.ceiling(light, 1.95, 0.7);
+    let (eye, yfov) = (dvec3(0.0, 1.0, 3.6), 2.0 * 0.5f64.atan().to_degrees());
+    scene.camera("main", Camera { eye, target: eye + dvec3(0.0, -0.12, -1.0), yfov, aspect: 1.5 });
+    BuiltScene::new(&scene, sky)
+}
+
+/// The mean is a value that was itself estimated: within four standard errors of both, the rendering's being below 0.5 %.
+#[track_caller]
+fn assert_given(rendering: &Rendering, given: Estimate, what: &str) {
+    let estimate = rendering.pixels.mean_estimate();
+    assert_eq!(rendering.rejected, 0, "{what}: rejected contributions");
+    assert!(estimate.error < 0.005 * given.mean, "{what}: {estimate:?} is too noisy to test {given:?}");
+    assert!(estimate.z(&given, 0.0).abs() <= 4.0, "{what}: {estimate:?}, expected {given:?}");
+}
+
+/// Check 12: light of two edges and more, and how many light paths reach their second to fifth vertex. The panel, which is black, has
+/// vertices as well; without them the numbers are .6690, .1379, .0417 and .0126.
+#[test]
+fn toy_without_emission_that_is_seen() {
+    let scene = toy(None);
+    let rendering = sbdpt(&scene.job().size(96, 64), 5, 64).set("use_implicit", false).render();
+    assert_given(&rendering, Estimate { mean: 0.07352, error: 0.00001 }, "k >= 2");
+    let paths = f64::from(96 * 64 * 64);
+    for (t, given) in [(1, 1.0), (2, 0.66896), (3, 0.15253), (4, 0.04425), (5, 0.01345f64)] {
+        let found = rendering.tallies[t];
+        let error = (given * (1.0 - given) / paths).sqrt();
+        assert!((found - given).abs() <= 4.0 * error.hypot(1e-4), "q_{t} = {found}, expected {given}");
+    }
+}
+
+/// Check 12: the panel alone.
+#[test]
+fn toy_with_nothing_but_emission_that_is_seen() {
+    let scene = toy(None);
+    let rendering = sbdpt(&scene.job().size(96, 64), 1, 256).render();
+    assert_given(&rendering, Estimate { mean: 0.0911, error: 0.0007 }, "k = 1");
+}
+
+/// Check 12: with a sky of radiance 1.
+#[test]
+fn toy_under_a_sky() {
+    let scene = toy(Some(&Sky::constant([1.0; 3])));
+    let rendering = sbdpt(&scene.job().size(48, 32), 5, 64).render();
+    assert_given(&rendering, Estimate { mean: 0.9560, error: 0.0006 }, "with sky");
+}
+
+/// Check 15: out of glass at normal incidence radiance grows by eta^2 and loses 4 %: 2.25 x .96 = 2.16.
+#[test]
+fn radiance_of_the_sky_seen_from_inside_glass() {
+    let camera = narrow(dvec3(0.0, -1.0, 0.0), DVec3::ZERO);
+    let scene = glass_over_a_floor(Material::lambert("black", [0.0; 3]), -2.0, camera);
+    let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
+    assert_mean(&sbdpt(&scene.job().size(16, 16), 4, 64).render(), 2.16, "sky seen from inside glass");
+}
+
+/// Check 15: an emitter inside glass seen from outside at normal incidence: .96/2.25 = .4266667.
+#[test]
+fn radiance_of_an_emitter_inside_glass() {
+    let scene = glass_over_a_floor(Material::emitter("light", [1.0; 3]), -1.0, narrow(DVec3::Y, DVec3::ZERO));
+    let scene = BuiltScene::new(&scene, None);
+    assert_mean(&sbdpt(&scene.job().size(16, 16), 4, 64).render(), 0.426_666_7, "emitter inside glass");
+}
+
+/// Check 15: a floor inside glass gets 1 - F_ext = .9082220 of the light of a sky above. Importance carries no factor: with one, the
+/// light that walks from the sky bring is too bright.
+#[test]
+fn floor_inside_glass_under_a_sky() {
+    let scene = BuiltScene::new(&floor_below_glass(0.0), Some(&sky_above()));
+    let job = FROM_BELOW_THE_LIGHT.job(&scene, "sbdpt").edges(3).samples(512);
+    let right = job.render();
+    FROM_BELOW_THE_LIGHT.assert_pixels(&right, |_| 0.5 * 0.908_222_0, "floor inside glass");
+    let wrong = particles(job).set("refraction_adjoint", false).render();
+    assert_differ(&wrong, &right, "as if importance were radiance, light outside");
+}
+
+/// Check 15 the other way round: a lamp inside a ball of glass that absorbs lights a floor outside.
+#[test]
+fn floor_beside_a_lamp_inside_glass() {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(Material::lambert("floor", [0.7, 0.6, 0.5]));
+    let bottle = Some(([0.4, 0.7, 0.9], 0.5));
+    let glass = scene.material(Material { attenuation: bottle, ..Material::glass("glass", 1.5, 0.0) });
+    let lamp = scene.material(Material::emitter("lamp", [5.0, 4.0, 3.0]));
+    scene.floor(floor, 0.0, 4.0);
+    scene.mesh(glass, sphere(dvec3(0.0, 0.7, 0.0), 0.5, 12).flat());
+    scene.mesh(lamp, sphere(dvec3(0.0, 0.7, 0.0), 0.3, 8).flat());
+    scene.camera("main", Camera { eye: dvec3(0.0, 0.15, 3.0), target: dvec3(0.0, 0.0, 0.0), yfov: 6.0, aspect: 2.0 });
+    let scene = BuiltScene::new(&scene, None);
+    let job = scene.job().size(64, 32).edges(4);
+    let from_camera = job.clone().pipeline("pt").samples(128).render();
+    assert_agree(&job.clone().pipeline("lt").samples(128).render(), &from_camera, "lt and pt");
+    let job = job.pipeline("sbdpt").samples(32);
+    assert_agree(&job.render(), &from_camera, "sbdpt and pt");
+    let wrong = job.set("counting", "first").set("refraction_adjoint", false).render();
+    assert_differ(&wrong, &from_camera, "as if importance were radiance");
+}
+
+/// Check 18: a coarse sphere with smooth normals. Without the correction of light walks the image is another one, which shows best
+/// where neither sampled light nor joined walks help.
+#[test]
+fn sbdpt_agrees_on_a_coarse_sphere_with_smooth_normals() {
+    let scene = ball_beside_a_wall(Material::lambert("clay", [0.8, 0.5, 0.3]), 3);
+    let job = scene.job().size(64, 64).edges(4);
+    let expected = job.clone().pipeline("pt").samples(64).render();
+    let job = job.pipeline("sbdpt").set("counting", "first").samples(32);
+    let splats = job.clone().set("use_explicit", false).set("use_connection", false);
+    for rendering in [job.render(), splats.render()] {
+        assert_agree(&rendering, &expected, "smooth normals");
+        assert_same(&rendering.pixels, &expected.pixels, 8, 0.01, "smooth normals, small blocks");
+    }
+    let wrong = worst_of_blocks(&splats.set("shading_normal_adjoint", false).render().pixels, &expected.pixels, 8);
+    assert!(wrong.largest > 12.0, "without the correction: {wrong:?}");
+}
+
+/// Check 18: where faces are flat the correction changes nothing, to the bit.
+#[test]
+fn flat_faces_need_no_correction() {
+    let scene = between_plates();
+    let job = sbdpt(&scene.job().size(16, 16), 4, 16).set("counting", "first").fixed_point();
+    let corrected = job.render();
+    assert!(corrected.sums.iter().any(|&sum| sum != 0), "a black image proves nothing");
+    assert!(
+        corrected.sums == job.set("shading_normal_adjoint", false).render().sums,
+        "the correction changes the image"
+    );
+}
+
+/// A closed room with a block, a light under the ceiling and a panel that emits from both sides, all in the picture.
+fn closed_box() -> BuiltScene {
+    let mut scene = SceneBuilder::new();
+    let wall = scene.material(Material::lambert("wall", [0.75, 0.7, 0.65]));
+    let block = scene.material(Material::lambert("block", [0.6, 0.3, 0.2]));
+    let light = scene.material(Material::emitter("light", [6.0, 5.0, 4.0]));
+    let panel = scene.material(Material::emitter("panel", [1.0, 2.0, 3.0]).two_sided());
+    scene.room(wall, DVec3::splat(-1.0), DVec3::splat(1.0));
+    scene.mesh(block, turned_cuboid(dvec3(-0.6, -1.0, -0.5), dvec3(0.0, 0.1, 0.1), 0.4));
+    scene.ceiling(light, 0.98, 0.6);
+    scene.quad(panel, dvec3(0.3, -0.3, -0.3), DVec3::X * 0.4, DVec3::Y * 0.5);
+    scene.camera("main", Camera { eye: dvec3(0.3, 0.1, 0.95), target: dvec3(0.0, -0.1, 0.0), yfov: 80.0, aspect: 1.0 });
+    BuiltScene::new(&scene, None)
+}
+
+/// Edges of the longest path in the closed box.
+const BOX_EDGES: u32 = 4;
+
+fn box_job(scene: &BuiltScene, pipeline: &str, samples: u32) -> Job {
+    scene.job().pipeline(pipeline).size(32, 32).edges(BOX_EDGES).samples(samples).seed(2)
+}
+
+/// The closed box by `pt`.
+static BOX: LazyLock<Rendering> = LazyLock::new(|| box_job(&closed_box(), "pt", 256).seed(1).render());
+
+/// Checks 10 and 11: a closed box, whatever the weights and the count of implicit samples.
+#[test]
+fn sbdpt_agrees_on_a_closed_box() {
+    let scene = closed_box();
+    for (mis, counting) in [BALANCE, POWER, AVERAGE] {
+        let rendering = box_job(&scene, "sbdpt", 32).set("mis", mis).set("counting", counting).render();
+        assert_agree(&rendering, &BOX, &format!("{mis}, {counting}"));
+    }
+    assert_agree(&box_job(&scene, "lt", 64).render(), &BOX, "lt and pt");
+}
+
+/// What ends walks by chance leaves the mean of every pipeline as it was.
+#[test]
+fn roulette_keeps_the_mean() {
+    let scene = closed_box();
+    for (pipeline, samples, key, value) in [
+        ("pt", 64, "roulette", "true"),
+        ("nee", 64, "roulette", "true"),
+        ("lt", 128, "roulette", "true"),
+        ("sbdpt", 32, "roulette", "true"),
+        ("pt", 64, "regularise", "roulette"),
+        ("sbdpt", 32, "regularise", "roulette"),
+    ] {
+        let job = box_job(&scene, pipeline, samples).set("roulette_start", 1).set(key, value);
+        assert_agree(&job.render(), &BOX, &format!("{pipeline}, {key}"));
+    }
+}
+
+/// What ends walks that can no longer be joined leaves the mean as it was.
+#[test]
+fn early_ends_keep_the_mean() {
+    let rendering = box_job(&closed_box(), "sbdpt", 32).set("early_end", true).render();
+    assert_agree(&rendering, &BOX, "early_end");
+}
+
+/// Walks that end behind two diffuse vertices take light away.
+#[test]
+fn cutting_walks_darkens() {
+    let scene = closed_box();
+    for pipeline in ["pt", "sbdpt"] {
+        let cut = box_job(&scene, pipeline, 32).set("regularise", "cut").render();
+        assert_differ(&cut, &BOX, pipeline);
+        assert!(cut.pixels.mean_estimate().mean < BOX.pixels.mean_estimate().mean, "{pipeline} became brighter");
+    }
+}
+
+/// Check 22: the error falls with the root of the number of samples.
+#[test]
+fn the_error_falls_with_the_root_of_samples() {
+    let scene = between_plates();
+    let error = |samples: u32| {
+        let rendering = plates_job(&scene, "sbdpt", 4, samples).render();
+        error_to(&rendering.pixels, &PLATES.pixels)
+    };
+    let errors = [4, 16, 64].map(error);
+    let slope = (errors[2] / errors[0]).log(16.0);
+    assert!((slope + 0.5).abs() < 0.05, "slope {slope}, root mean square errors {errors:?}");
+}
+
+/// Root mean square of the error of an image, that of the reference left out.
+fn error_to(image: &Pixels, reference: &Pixels) -> f64 {
+    let values = |rows: &[[f32; 3]]| -> Vec<f64> { rows.iter().flatten().map(|&value| f64::from(value)).collect() };
+    let (found, expected, noise) = (values(&image.rgb), values(&reference.rgb), values(&reference.errors));
+    let squares = found.iter().zip(&expected).map(|(a, b)| (a - b).powi(2));
+    let known: f64 = noise.iter().map(|error| error.powi(2)).sum();
+    ((squares.sum::<f64>() - known) / found.len() as f64).sqrt()
+}

@@ -1,0 +1,671 @@
+//! Deliberate errors in the stages, one by one, and for each the comparison that has to notice it.
+
+use glam::{DVec3, dvec3};
+use std::f64::consts::PI;
+use tests::closed_form::{ball_in_a_constant_sky, floor_below_glass, furnace, grey, narrow, sky_above};
+use tests::compared;
+use tests::material::Material;
+use tests::mutation::{Check, Mutation, Stages, Verdict, assert_noticed};
+use tests::rendering::{BuiltScene, Job, shipped};
+use tests::scene_builder::{Camera, SceneBuilder};
+use tests::shape::{quad, sphere};
+use tests::sky::Sky;
+
+/// Pixels along an edge of a block whose mean is compared.
+const BLOCK: usize = 4;
+
+/// Two pipelines, each with its samples, must show the same image.
+fn same(stages: Stages, job: Job, pipelines: [(&str, u32); 2]) -> Verdict {
+    same_blocks(stages, job, pipelines, BLOCK)
+}
+
+fn same_blocks(stages: Stages, job: Job, pipelines: [(&str, u32); 2], block: usize) -> Verdict {
+    let [a, b] = pipelines.map(|(name, samples)| stages.render(job.clone().pipeline(name).samples(samples)));
+    Verdict::same(&a, &b, block)
+}
+
+/// A pipeline, with its samples, must show this radiance everywhere.
+fn constant(stages: Stages, job: Job, (pipeline, samples): (&str, u32), expected: f64) -> Verdict {
+    Verdict::constant(&stages.render(job.pipeline(pipeline).samples(samples)), expected, BLOCK)
+}
+
+/// A small image of paths of so many edges.
+fn small(scene: &BuiltScene, edges: u32) -> Job {
+    scene.job().size(24, 24).edges(edges)
+}
+
+fn seen(mut scene: SceneBuilder, camera: Camera) -> BuiltScene {
+    scene.camera("main", camera);
+    BuiltScene::new(&scene, None)
+}
+
+/// Looks straight down on the square of this half edge about the origin, from a height.
+fn from_above(height: f64, half: f64) -> Camera {
+    let yfov = 2.0 * (half / height).atan().to_degrees();
+    Camera { eye: DVec3::Y * height, target: DVec3::ZERO, yfov, aspect: 1.0 }
+}
+
+static LAMPS_FROM_THE_LIGHTS: Check =
+    Check::new("lt and pt, lamps", |stages| same(stages, small(&compared::lamps(), 4), [("lt", 512), ("pt", 256)]));
+
+fn sun_and_sky(stages: Stages, pipelines: [(&str, u32); 2]) -> Verdict {
+    same(stages, small(&compared::sun_and_sky(), 3), pipelines)
+}
+
+static SUN_AND_SKY_FROM_THE_CAMERA: Check =
+    Check::new("pt and nee, sun and sky", |stages| sun_and_sky(stages, [("pt", 256), ("nee", 256)]));
+static SUN_AND_SKY_FROM_THE_LIGHTS: Check =
+    Check::new("lt and pt, sun and sky", |stages| sun_and_sky(stages, [("lt", 1024), ("pt", 128)]));
+static SUN_AND_SKY_FROM_BOTH_SIDES: Check =
+    Check::new("sbdpt and pt, sun and sky", |stages| sun_and_sky(stages, [("sbdpt", 256), ("pt", 128)]));
+
+/// A floor under a sky, and a strong lamp below the floor that takes most of the light samples.
+static SKY_AND_HIDDEN_LAMP: Check = Check::new("pt and nee, sky and hidden lamp", |stages| {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(grey(0.6));
+    scene.floor(floor, 0.0, 2.0);
+    scene.point_light(DVec3::NEG_Y, [3.0; 3]);
+    scene.camera("main", from_above(2.0, 0.8));
+    let sky = Sky::from_directions(32, 16, |towards| [0.2 + 0.8 * towards.x.max(0.0), 0.3, 0.6 + 0.4 * towards.y]);
+    let scene = BuiltScene::new(&scene, Some(&sky));
+    same(stages, small(&scene, 2), [("pt", 1024), ("nee", 1024)])
+});
+
+/// A floor in the light of a large panel above it and of a small one beside it; a third shows it its dark back.
+fn near_panels(stages: Stages, floor: Material, pipelines: [(&str, u32); 2]) -> Verdict {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(floor);
+    let large = scene.material(Material::emitter("large", [1.0, 1.5, 1.2]));
+    let near = scene.material(Material::emitter("near", [5.0, 3.0, 4.0]));
+    scene.floor(floor, 0.0, 2.0);
+    scene.ceiling(large, 0.5, 0.8);
+    scene.quad(near, dvec3(0.35, 0.02, 0.15), DVec3::Y * 0.2, DVec3::NEG_Z * 0.3);
+    scene.quad(near, dvec3(-0.35, 0.02, 0.15), DVec3::Y * 0.2, DVec3::NEG_Z * 0.3);
+    let camera = Camera { eye: dvec3(0.0, 0.4, 1.5), target: DVec3::ZERO, yfov: 18.0, aspect: 1.0 };
+    same(stages, small(&seen(scene, camera), 2), pipelines)
+}
+
+static NEAR_PANELS_FROM_THE_CAMERA: Check =
+    Check::new("pt and nee, near panels", |stages| near_panels(stages, grey(0.6), [("pt", 512), ("nee", 512)]));
+static NEAR_PANELS_FROM_THE_LIGHTS: Check =
+    Check::new("lt and pt, near panels", |stages| near_panels(stages, grey(0.6), [("lt", 1024), ("pt", 256)]));
+static NEAR_PANELS_FROM_BOTH_SIDES: Check =
+    Check::new("sbdpt and pt, near panels", |stages| near_panels(stages, grey(0.6), [("sbdpt", 256), ("pt", 512)]));
+static PANELS_OVER_METAL: Check = Check::new("pt and nee, near panels over rough metal", |stages| {
+    near_panels(stages, Material::metal("metal", [0.9, 0.7, 0.4], 0.5), [("pt", 512), ("nee", 512)])
+});
+
+static CORNELL_BOX: Check = Check::new("pt and nee, Cornell box", |stages| {
+    let job = Job::of_file(shipped("cornell_box")).size(24, 24).edges(5);
+    same(stages, job, [("pt", 512), ("nee", 512)])
+});
+
+/// A floor below a ceiling whose normals lean, which a panel lights from below: no path of two edges.
+static CEILING_FROM_BOTH_SIDES: Check = Check::new("sbdpt and pt, lit ceiling with leaning normals", |stages| {
+    let mut scene = SceneBuilder::new();
+    let white = scene.material(grey(0.8));
+    let light = scene.material(Material::emitter("light", [3.0; 3]));
+    let mut ceiling = quad(dvec3(-0.8, 0.8, -0.8), DVec3::X * 1.6, DVec3::Z * 1.6);
+    ceiling.normals = vec![dvec3(0.4f64.sin(), -0.4f64.cos(), 0.0); 4];
+    scene.mesh(white, ceiling);
+    scene.floor(white, 0.0, 1.6);
+    scene.quad(light, dvec3(-0.8, 0.4, 0.4), DVec3::X * 0.5, DVec3::NEG_Z * 0.8);
+    let camera = Camera { eye: dvec3(0.0, 0.3, 2.0), target: DVec3::ZERO, yfov: 25.0, aspect: 1.0 };
+    same(stages, small(&seen(scene, camera), 4), [("sbdpt", 512), ("pt", 2048)])
+});
+
+/// A ball with smooth normals of few rings in the light of a panel.
+static COARSE_BALL: Check = Check::new("lt and pt, coarse ball with smooth normals", |stages| {
+    let mut scene = SceneBuilder::new();
+    let clay = scene.material(Material::lambert("clay", [0.8, 0.5, 0.3]));
+    let light = scene.material(Material::emitter("light", [3.0; 3]));
+    scene.mesh(clay, sphere(DVec3::ZERO, 0.5, 4));
+    scene.ceiling(light, 1.0, 1.0);
+    let camera = Camera { eye: dvec3(0.5, 0.3, 3.0), target: DVec3::ZERO, yfov: 20.0, aspect: 1.0 };
+    same(stages, small(&seen(scene, camera), 2), [("lt", 2048), ("pt", 512)])
+});
+
+/// A plane whose normals lean, in parallel light that slants.
+static LEANING_NORMALS: Check = Check::new("lt, rho E cos / pi with leaning normals", |stages| {
+    let (tilt, slant) = (0.3f64, 0.5f64);
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(grey(0.5));
+    let mut plane = quad(dvec3(-1.0, 0.0, 1.0), DVec3::X * 2.0, DVec3::NEG_Z * 2.0);
+    plane.normals = vec![dvec3(tilt.sin(), tilt.cos(), 0.0); 4];
+    scene.mesh(floor, plane);
+    scene.directional_light(dvec3(-slant.sin(), -slant.cos(), 0.0), [2.0; 3]);
+    let scene = seen(scene, from_above(2.0, 0.8));
+    constant(stages, small(&scene, 2), ("lt", 512), 0.5 / PI * 2.0 * (slant - tilt).cos())
+});
+
+/// A mirror that shows a panel above a floor.
+static MIRROR: Check = Check::new("pt and nee, mirror", |stages| {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(grey(0.5));
+    let mirror = scene.material(Material::metal("mirror", [0.9, 0.8, 0.7], 0.0));
+    let light = scene.material(Material::emitter("light", [1.0; 3]));
+    scene.floor(floor, 0.0, 4.0);
+    scene.quad(mirror, dvec3(-1.0, 0.0, -1.0), DVec3::X * 2.0, DVec3::Y * 2.0);
+    scene.ceiling(light, 1.5, 1.0);
+    let camera = Camera { eye: dvec3(0.0, 0.8, 3.0), target: dvec3(0.0, 0.8, 0.0), yfov: 40.0, aspect: 1.0 };
+    same(stages, small(&seen(scene, camera), 2), [("pt", 128), ("nee", 128)])
+});
+
+/// A floor beside a mirror, which throws the light of a panel on it.
+static CAUSTIC_FROM_BOTH_SIDES: Check = Check::new("sbdpt and pt, caustic of a mirror", |stages| {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(grey(0.6));
+    let mirror = scene.material(Material::metal("mirror", [0.9, 0.8, 0.7], 0.0));
+    let light = scene.material(Material::emitter("light", [3.0; 3]));
+    scene.floor(floor, 0.0, 2.0);
+    scene.quad(mirror, dvec3(-0.3, 0.0, 0.5), DVec3::NEG_Z, DVec3::Y);
+    scene.ceiling(light, 1.0, 1.0);
+    same(stages, small(&seen(scene, from_above(0.9, 0.25)), 3), [("sbdpt", 512), ("pt", 1024)])
+});
+
+/// The sharp disk of a spot light on a floor, seen from above.
+fn disk_of_light(stages: Stages, camera: impl Fn(Job) -> Job) -> Verdict {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(grey(0.5));
+    scene.floor(floor, 0.0, 20.0);
+    scene.spot_light(dvec3(0.1, 1.0, -0.05), DVec3::NEG_Y, [1.0; 3], 0.29, 0.3);
+    let scene = seen(scene, from_above(4.0, 0.8));
+    same_blocks(stages, camera(small(&scene, 2)), [("lt", 512), ("pt", 512)], 1)
+}
+
+static DISK_OF_LIGHT: Check = Check::new("lt and pt, disk of light", |stages| disk_of_light(stages, |job| job));
+static THROUGH_A_LENS: Check =
+    Check::new("lt and pt, disk of light through a lens", |stages| disk_of_light(stages, |job| job.lens(0.3, 1.6)));
+
+static BELOW_A_POINT: Check = Check::new("nee, rho I / (pi h^2) below a point light", |stages| {
+    let mut scene = SceneBuilder::new();
+    let floor = scene.material(grey(0.5));
+    scene.floor(floor, 0.0, 20.0);
+    scene.point_light(DVec3::Y * 2.0, [1.0; 3]);
+    let scene = seen(scene, narrow(DVec3::Y * 3.0, DVec3::ZERO));
+    constant(stages, small(&scene, 2), ("nee", 64), 0.5 / PI / 4.0)
+});
+
+static FURNACE_FROM_THE_CAMERA: Check =
+    Check::new("pt, furnace", |stages| constant(stages, small(&furnace(0.8), 4), ("pt", 512), 2.952));
+static FURNACE_FROM_THE_LIGHTS: Check =
+    Check::new("lt, furnace", |stages| constant(stages, small(&furnace(0.8), 4), ("lt", 512), 2.952));
+/// Eye walks that meet light and light walks that are joined to the camera, weighted against each other over whole paths.
+static FURNACE_BY_WHOLE_WALKS: Check = Check::new("sbdpt without joined walks, furnace", |stages| {
+    let scene = furnace(0.8);
+    let job = small(&scene, 4).set("use_explicit", false).set("use_connection", false);
+    constant(stages, job, ("sbdpt", 256), 2.952)
+});
+
+static WHITE_METAL: Check = Check::new("pt, white metal reflects no more than it gets", |stages| {
+    let scene = ball_in_a_constant_sky(Material::metal("metal", [1.0; 3], 0.7), 22.0);
+    Verdict::at_most(&stages.render(small(&scene, 2).pipeline("pt").samples(256)), 1.0, BLOCK)
+});
+
+static EMITTER_INSIDE_GLASS: Check = Check::new("pt, emitter inside glass that absorbs half: .96/2.25/2", |stages| {
+    let mut scene = SceneBuilder::new();
+    let half = Some(([0.5; 3], 1.0));
+    let glass = scene.material(Material { attenuation: half, ..Material::glass("glass", 1.5, 0.0) });
+    let light = scene.material(Material::emitter("light", [1.0; 3]));
+    scene.floor(glass, 0.0, 400.0);
+    scene.floor(light, -1.0, 400.0);
+    let scene = seen(scene, narrow(DVec3::Y, DVec3::ZERO));
+    constant(stages, small(&scene, 4), ("pt", 256), 0.213_333_3)
+});
+
+static FLOOR_INSIDE_GLASS: Check = Check::new("lt, floor inside glass: .9082220 rho", |stages| {
+    let scene = BuiltScene::new(&floor_below_glass(0.0), Some(&sky_above()));
+    constant(stages, small(&scene, 3), ("lt", 2048), 0.5 * 0.908_222_0)
+});
+static FLOOR_INSIDE_ROUGH_GLASS: Check = Check::new("lt and pt, floor inside rough glass", |stages| {
+    let scene = BuiltScene::new(&floor_below_glass(0.5), Some(&sky_above()));
+    same(stages, small(&scene, 3), [("lt", 2048), ("pt", 512)])
+});
+
+/// A floor and a panel inside a body of coloured glass, seen through its upper face.
+static INSIDE_COLOURED_GLASS: Check = Check::new("pt and nee, inside coloured glass", |stages| {
+    let mut scene = SceneBuilder::new();
+    let colour = Some(([0.4, 0.6, 0.8], 0.5));
+    let glass = scene.material(Material { attenuation: colour, ..Material::glass("glass", 1.5, 0.0) });
+    let floor = scene.material(grey(0.6));
+    let light = scene.material(Material::emitter("light", [5.0; 3]));
+    scene.floor(glass, 1.0, 8.0);
+    scene.floor(floor, 0.0, 8.0);
+    scene.quad(light, dvec3(0.7, 0.1, 0.4), DVec3::Y * 0.6, DVec3::NEG_Z * 0.8);
+    same(stages, small(&seen(scene, from_above(3.0, 0.6)), 4), [("pt", 512), ("nee", 256)])
+});
+
+#[test]
+fn errors_of_the_camera() {
+    assert_noticed(&[
+        Mutation {
+            name: "splats lie half a pixel beside their place",
+            module: "camera/camera",
+            old: "* (0.5 * size);",
+            new: "* (0.5 * size) + vec2r(0.5);",
+            check: &DISK_OF_LIGHT,
+        },
+        Mutation {
+            name: "a cosine is missing in the density of camera rays",
+            module: "camera/camera",
+            old: "cosine * cosine * cosine",
+            new: "cosine * cosine",
+            check: &LEANING_NORMALS,
+        },
+        Mutation {
+            name: "light meets the middle of the lens alone",
+            module: "camera/camera",
+            old: "        offset = lens_point(random);\n        connection",
+            new: "        offset = vec3r(0.0);\n        connection",
+            check: &THROUGH_A_LENS,
+        },
+        Mutation {
+            name: "connections do not know the plane in focus",
+            module: "camera/camera",
+            old: "plane += offset.xy / real(scene.camera_forward.w);",
+            new: "plane += offset.xy;",
+            check: &THROUGH_A_LENS,
+        },
+    ]);
+}
+
+#[test]
+fn errors_of_emitters() {
+    assert_noticed(&[
+        Mutation {
+            name: "the cosine at the light is missing in connections",
+            module: "light/triangle_light",
+            old: "sample.cosine = abs(dot(point.geometric_normal, sample.direction));",
+            new: "sample.cosine = 1.0;",
+            check: &NEAR_PANELS_FROM_THE_CAMERA,
+        },
+        Mutation {
+            name: "the cosine of emission counts twice",
+            module: "light/triangle_light",
+            old: "emission.weight = vec3r(sides * PI);",
+            new: "emission.weight = vec3r(sides * PI * emission.cosine);",
+            check: &NEAR_PANELS_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "the choice of a side is missing in emission",
+            module: "light/triangle_light",
+            old: "emission.weight = vec3r(sides * PI);",
+            new: "emission.weight = vec3r(PI);",
+            check: &LAMPS_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "every light emits from its back as well",
+            module: "surface/material",
+            old: "return faces && ",
+            new: "return ",
+            check: &NEAR_PANELS_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "points on triangles crowd at an edge",
+            module: "sample/triangle",
+            old: "if random.y > random.x {\n        let first = 0.5 * random.x;\n        return vec2r(first, random.y - first);",
+            new: "if random.y >= 0.0 {\n        return vec2r(random.x, random.y * (1.0 - random.x));",
+            check: &NEAR_PANELS_FROM_THE_CAMERA,
+        },
+        Mutation {
+            name: "the squared distance to a point light is missing",
+            module: "light/point_light",
+            old: "sample.density = pick_probability(light) * distance_squared;",
+            new: "sample.density = pick_probability(light);",
+            check: &BELOW_A_POINT,
+        },
+        Mutation {
+            name: "spot lights emit without their falloff",
+            module: "light/point_light",
+            old: "vec3r(point_light_falloff(vertex.light, emission.direction) / emission.pdf)",
+            new: "vec3r(1.0 / emission.pdf)",
+            check: &LAMPS_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "the disk of lights at infinity has half its radius in the density",
+            module: "light/directional_light",
+            old: "let radius = real(scene.bounds.w);",
+            new: "let radius = 0.5 * real(scene.bounds.w);",
+            check: &SUN_AND_SKY_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "the sine of the polar angle is missing in the sky's density",
+            module: "light/sky",
+            old: "real(sky_texels[sky_texel(point.uv)].w) / point.sine_polar",
+            new: "real(sky_texels[sky_texel(point.uv)].w)",
+            check: &SKY_AND_HIDDEN_LAMP,
+        },
+        Mutation {
+            name: "the sine of the polar angle is missing in emission from the sky",
+            module: "light/sky",
+            old: "drawn.density / drawn.point.sine_polar;",
+            new: "drawn.density;",
+            check: &SUN_AND_SKY_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "slot and alias are swapped when a light is picked",
+            module: "light/table",
+            old: "select(entry.y, slot,",
+            new: "select(slot, entry.y,",
+            check: &NEAR_PANELS_FROM_THE_CAMERA,
+        },
+    ]);
+}
+
+#[test]
+fn errors_of_weights() {
+    assert_noticed(&[
+        Mutation {
+            name: "light that is met counts in full beside light that is sampled",
+            module: "stage/shade_mis",
+            old: "emission_at(surface) * weight",
+            new: "emission_at(surface)",
+            check: &NEAR_PANELS_FROM_THE_CAMERA,
+        },
+        Mutation {
+            name: "the sky that is met counts in full beside the sky that is sampled",
+            module: "stage/escape_mis",
+            old: "sky_radiance(walk.direction) * weight",
+            new: "sky_radiance(walk.direction)",
+            check: &SUN_AND_SKY_FROM_THE_CAMERA,
+        },
+        Mutation {
+            name: "the pick probability is missing in the density of hitting the sky",
+            module: "light/sky",
+            old: "return real(sky_frame.turn.z) * real(",
+            new: "return real(",
+            check: &SKY_AND_HIDDEN_LAMP,
+        },
+        Mutation {
+            name: "a wrong pick probability in the density of hitting a light",
+            module: "light/light",
+            old: "return triangle_light_pdf_area(emitter.light) *",
+            new: "return 0.5 * triangle_light_pdf_area(emitter.light) *",
+            check: &NEAR_PANELS_FROM_THE_CAMERA,
+        },
+        Mutation {
+            name: "connections are weighted with the density of the wrong direction",
+            module: "stage/shade_mis",
+            old: "weighted_inverse_light_pdf(light, scattered.pdf)",
+            new: "weighted_inverse_light_pdf(light, eval_bsdf(bsdf, light.direction, outgoing, RADIANCE).pdf)",
+            check: &NEAR_PANELS_FROM_THE_CAMERA,
+        },
+        Mutation {
+            name: "one strategy uses the power heuristic, the other the balance heuristic",
+            module: "transport/mis",
+            old: "let ratio = light_pdf / scatter_pdf;\n    if heuristic == heuristic_power {",
+            new: "let ratio = light_pdf / scatter_pdf;\n    if heuristic != heuristic_power {",
+            check: &NEAR_PANELS_FROM_THE_CAMERA,
+        },
+        Mutation {
+            name: "a mirror counts as a strategy that could have sampled the light",
+            module: "stage/shade_mis",
+            old: "select(sample.pdf, 0.0, sample.delta)",
+            new: "sample.pdf",
+            check: &MIRROR,
+        },
+        Mutation {
+            name: "the reference forgets light behind mirrors",
+            module: "transport/reference",
+            old: "counts = counts || (walk.flags & FLAGS_SPECULAR) != 0u;",
+            new: "counts = counts || false;",
+            check: &MIRROR,
+        },
+    ]);
+}
+
+#[test]
+fn errors_of_scattering() {
+    assert_noticed(&[
+        Mutation {
+            name: "the cosine of scattering is missing",
+            module: "bsdf/bsdf",
+            old: "result.value = lobes.f * scattering_cosine(bsdf, outgoing, incoming, mode);",
+            new: "result.value = lobes.f;",
+            check: &LEANING_NORMALS,
+        },
+        Mutation {
+            name: "pi is missing in Lambert's law",
+            module: "bsdf/lambert",
+            old: "return albedo * INVERSE_PI;",
+            new: "return albedo;",
+            check: &BELOW_A_POINT,
+        },
+        Mutation {
+            name: "microfacets do not mask each other",
+            module: "bsdf/ggx",
+            old: "return ggx_distribution(half_vector, alpha) / (2.0 * shadowing);",
+            new: "return ggx_distribution(half_vector, alpha) / (4.0 * outgoing.z * incoming.z);",
+            check: &WHITE_METAL,
+        },
+        Mutation {
+            name: "the density of microfacets is that of all, not of visible ones",
+            module: "bsdf/ggx",
+            old: "return 0.25 * smith_masking_over_cosine(outgoing, alpha) * ggx_distribution(half_vector, alpha);",
+            new: "return 0.25 * ggx_distribution(half_vector, alpha) * half_vector.z / dot(outgoing, half_vector);",
+            check: &PANELS_OVER_METAL,
+        },
+        Mutation {
+            name: "eta^2 scales radiance on the wrong side",
+            module: "bsdf/bsdf",
+            old: "weight /= bsdf.eta * bsdf.eta;",
+            new: "weight *= bsdf.eta * bsdf.eta;",
+            check: &EMITTER_INSIDE_GLASS,
+        },
+        Mutation {
+            name: "eta^2 scales importance as well",
+            module: "bsdf/bsdf",
+            old: "if mode == RADIANCE || !refraction_adjoint {",
+            new: "if mode == RADIANCE || mode == IMPORTANCE || !refraction_adjoint {",
+            check: &FLOOR_INSIDE_GLASS,
+        },
+        Mutation {
+            name: "rough glass scatters importance as radiance",
+            module: "bsdf/bsdf",
+            old: "result.value *= bsdf.eta * bsdf.eta;",
+            new: "result.value *= 1.0;",
+            check: &FLOOR_INSIDE_ROUGH_GLASS,
+        },
+        Mutation {
+            name: "eta^2 is missing in the density of refraction",
+            module: "bsdf/dielectric",
+            old: "common_factor * eta * eta,",
+            new: "common_factor,",
+            check: &FLOOR_INSIDE_ROUGH_GLASS,
+        },
+        Mutation {
+            name: "inside and outside of glass are swapped",
+            module: "bsdf/bsdf",
+            old: "select(1.0 / bsdf.ior, bsdf.ior, side > 0.0)",
+            new: "select(bsdf.ior, 1.0 / bsdf.ior, side > 0.0)",
+            check: &EMITTER_INSIDE_GLASS,
+        },
+        Mutation {
+            name: "importance is not corrected for shading normals",
+            module: "bsdf/bsdf",
+            old: "return abs(dot(incoming, bsdf.facing_normal))\n            * dot(outgoing, bsdf.frame.normal) / dot(outgoing, bsdf.facing_normal);",
+            new: "return abs(dot(incoming, bsdf.frame.normal));",
+            check: &COARSE_BALL,
+        },
+        Mutation {
+            name: "the correction for shading normals is upside down",
+            module: "bsdf/bsdf",
+            old: "* dot(outgoing, bsdf.frame.normal) / dot(outgoing, bsdf.facing_normal);",
+            new: "* dot(outgoing, bsdf.facing_normal) / dot(outgoing, bsdf.frame.normal);",
+            check: &LEANING_NORMALS,
+        },
+    ]);
+}
+
+#[test]
+fn errors_of_walks() {
+    assert_noticed(&[
+        Mutation {
+            name: "shadow rays are not absorbed",
+            module: "transport/direct",
+            old: "connection.contribution *= transmittance(medium, segment.distance);",
+            new: "connection.contribution *= transmittance(medium, 0.0);",
+            check: &INSIDE_COLOURED_GLASS,
+        },
+        Mutation {
+            name: "walks enter a solid when they leave it",
+            module: "transport/medium",
+            old: "return select(NO_MEDIUM, surface.material, surface.front);",
+            new: "return select(surface.material, NO_MEDIUM, surface.front);",
+            check: &EMITTER_INSIDE_GLASS,
+        },
+        Mutation {
+            name: "shadow rays reach beyond their end",
+            module: "stage/resolve",
+            old: "connection.distance, key",
+            new: "2.0 * connection.distance, key",
+            check: &CORNELL_BOX,
+        },
+        Mutation {
+            name: "light walks have one edge too many",
+            module: "stage/shade_light",
+            old: "if path.length >= max_edges {",
+            new: "if path.length > max_edges {",
+            check: &FURNACE_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "every bounce draws the same numbers",
+            module: "stage/shade_mis",
+            old: "random4(WALK_EYE, path.length, DIMENSION_SCATTER)",
+            new: "random4(WALK_EYE, 1u, DIMENSION_SCATTER)",
+            check: &CORNELL_BOX,
+        },
+        Mutation {
+            name: "connections to the camera carry the density of scattering, not its value",
+            module: "stage/shade_light",
+            old: "walk.throughput * scattered.value * camera.importance;",
+            new: "walk.throughput * scattered.pdf * camera.importance;",
+            check: &FURNACE_FROM_THE_LIGHTS,
+        },
+        Mutation {
+            name: "walks go on without the weight of scattering",
+            module: "transport/walk",
+            old: "walk.throughput *= sample.weight;",
+            new: "walk.throughput *= 1.0;",
+            check: &FURNACE_FROM_THE_CAMERA,
+        },
+    ]);
+}
+
+#[test]
+fn errors_of_bidirectional_weights() {
+    assert_noticed(&[
+        Mutation {
+            name: "the implicit strategy counts as twice as many samples",
+            module: "transport/strategy",
+            old: "var samples = real(1.0);",
+            new: "var samples = real(2.0);",
+            check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the density forwards stands for the density in reverse",
+            module: "transport/recursive_mis",
+            old: "next.b = scaled(cosine / pdf, join(scaled(ended, sums.a), scaled(reverse_pdf, sums.b)));",
+            new: "next.b = scaled(cosine / pdf, join(scaled(ended, sums.a), scaled(pdf, sums.b)));",
+            check: &FURNACE_BY_WHOLE_WALKS,
+        },
+        Mutation {
+            name: "the sums a and b are swapped at connections",
+            module: "transport/recursive_mis",
+            old: "let walked = join(scaled(ended, sums.a), scaled(reverse_pdf, sums.b));",
+            new: "let walked = join(scaled(ended, sums.b), scaled(reverse_pdf, sums.a));",
+            check: &CEILING_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the sum c of the strategy that hits the light is dropped",
+            module: "transport/recursive_mis",
+            old: "return join(walked, scaled(hits * reverse_pdf, sums.c));",
+            new: "return walked;",
+            check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the cosine of the arriving direction stands for that of the leaving one",
+            module: "transport/advance",
+            old: "let cosine = surface_cosine(surface, sample.direction);",
+            new: "let cosine = surface_cosine(surface, walk.direction);",
+            check: &FURNACE_BY_WHOLE_WALKS,
+        },
+        Mutation {
+            name: "the squared distance is missing in a",
+            module: "transport/recursive_mis",
+            old: "sums.a * (distance_squared * inverse_cosine)",
+            new: "sums.a * inverse_cosine",
+            check: &CEILING_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the density of the emitted direction is missing for light that is met",
+            module: "stage/shade_eye",
+            old: "scaled(pdf_area * pdf_w, sums.b)",
+            new: "scaled(pdf_area, sums.b)",
+            check: &FURNACE_BY_WHOLE_WALKS,
+        },
+        Mutation {
+            name: "a delta lobe can be joined in the sums",
+            module: "transport/advance",
+            old: "if HAS_DELTA && sample.delta {",
+            new: "if HAS_DELTA && sample.pdf < 0.0 {",
+            check: &CAUSTIC_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the light vertex of a connection scatters radiance",
+            module: "transport/connect",
+            old: "eval_bsdf(bsdf, outgoing, -side.end.direction, IMPORTANCE)",
+            new: "eval_bsdf(bsdf, outgoing, -side.end.direction, RADIANCE)",
+            check: &CEILING_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the eye's side is missing in the weight of connections",
+            module: "transport/connect",
+            old: "join(eye_side, light_side)",
+            new: "light_side",
+            check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the light's side is missing in the weight of connections",
+            module: "transport/connect",
+            old: "join(eye_side, light_side)",
+            new: "eye_side",
+            check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the explicit strategy counts twice",
+            module: "transport/connect",
+            old: "transported * weight,",
+            new: "transported * (weight * select(1.0, 2.0, t == 1u)),",
+            check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the cosine at the surface is missing in the weight of splats",
+            module: "stage/shade_light_mis",
+            old: "camera.importance * surface_cosine(surface, camera.direction)",
+            new: "camera.importance",
+            check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the camera's density is missing in the sums",
+            module: "stage/start_eye",
+            old: "source(1.0 / camera_pdf_w(cosine))",
+            new: "source(1.0)",
+            check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "light from infinity is weighted as if it came from where the ray began",
+            module: "transport/advance",
+            old: "select(walk.hit.t, 1.0, parallel)",
+            new: "walk.hit.t",
+            check: &SUN_AND_SKY_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "the density on the disk is missing for the sky that is met",
+            module: "stage/escape_eye",
+            old: "pdf_sky * pdf_disk()",
+            new: "pdf_sky",
+            check: &SUN_AND_SKY_FROM_BOTH_SIDES,
+        },
+    ]);
+}
