@@ -183,6 +183,8 @@ fn unknown_adapter() {
 #[test]
 fn unknown_layer() {
     refused("aov", &["render", "--aov", "normals"], &["--aov normals", "help: ", "`variance`"]);
+    let arguments = ["render", "pt", "--aov", "strategies"];
+    refused("aov_pipeline", &arguments, &["the pipeline `pt` has no strategies to show"]);
 }
 
 #[test]

@@ -7,11 +7,23 @@ import package::transport::record::record_strategy_at;
 
 /// Adds a connection's contribution to its pixel if nothing stands between its ends.
 fn resolve(connection: ptr<function, Connection>) {
-    let key = opacity_key(connection.origin, connection.direction);
-    if !trace_any(connection.origin, connection.direction, connection.distance, key) {
-        splat(connection.pixel, connection.contribution);
-        if record_strategies {
-            record_strategy_at(connection.strategy, connection.pixel, connection.contribution, connection.unweighted);
-        }
+    _ = arrives(connection);
+}
+
+/// As `resolve`, for pipelines whose connections know their strategy.
+fn resolve_strategy(connection: ptr<function, Connection>) {
+    let arrived = arrives(connection);
+    if record_strategies && arrived {
+        record_strategy_at(connection.strategy, connection.pixel, connection.contribution, connection.unweighted);
     }
+}
+
+/// Whether a connection's contribution gets to its pixel, to which it is then added.
+fn arrives(connection: ptr<function, Connection>) -> bool {
+    let key = opacity_key(connection.origin, connection.direction);
+    if trace_any(connection.origin, connection.direction, connection.distance, key) {
+        return false;
+    }
+    splat(connection.pixel, connection.contribution);
+    return true;
 }
