@@ -23,13 +23,13 @@ pub fn save(
         make_folder(folder)?;
     }
     let strategies = strategies(rendered, metadata);
-    let layers: Vec<_> = strategies.iter().flat_map(Strategy::layers).collect();
+    let layers: Vec<_> = strategies.iter().flatten().flat_map(Strategy::layers).collect();
     image(rendered, metadata)?.save_with_layers(path, &layers)?;
     let factor = exposure.factor(&rendered.mean);
     let png = path.with_extension("png");
     write_png(&png, rendered.size, &to_srgb(&rendered.mean, factor))?;
     let mut written = vec![path.to_path_buf(), png];
-    if !strategies.is_empty() {
+    if let Some(strategies) = strategies {
         written.extend(pyramid::write(path, &strategies, rendered.size, factor)?);
     }
     Ok(written)
@@ -57,10 +57,7 @@ fn image(rendered: &Rendered, metadata: &RenderFile) -> Result<Image, Error> {
     })
 }
 
-fn strategies(rendered: &Rendered, metadata: &RenderFile) -> Vec<Strategy> {
-    if !metadata.wants(Aov::Strategies) {
-        return Vec::new();
-    }
-    let group = Aov::Strategies.to_string();
-    pyramid::strategies(&|index| rendered.layer(&group, index))
+fn strategies(rendered: &Rendered, metadata: &RenderFile) -> Option<Vec<Strategy>> {
+    let group = metadata.wants(Aov::Strategies).then(|| Aov::Strategies.to_string())?;
+    Some(pyramid::strategies(&|index| rendered.layer(&group, index)))
 }

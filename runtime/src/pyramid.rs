@@ -15,9 +15,9 @@ const SCALE: u32 = 2;
 
 /// What a pyramid shows of each strategy.
 type Pixels = fn(&Strategy) -> &[f32];
-/// The pyramids: names for their files, and what they show.
+/// The pyramids: how the names of their files end, and what they show.
 const PYRAMIDS: [(&str, Pixels); 2] =
-    [("weighted", |strategy| &strategy.weighted), ("unweighted", |strategy| &strategy.unweighted)];
+    [("weighted.png", |strategy| &strategy.weighted), ("unweighted.png", |strategy| &strategy.unweighted)];
 
 /// One strategy: `s` vertices from the eye walk, `t` from the light walk.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,9 +66,9 @@ fn index_of(edges: u32, s: u32) -> u32 {
     edges * (edges + 1) / 2 + s
 }
 
-/// Where the pyramids of a picture lie, each with its name: `OUT.weighted.png` and `OUT.unweighted.png` beside `OUT.exr`.
-pub fn files(picture: &Path) -> [(&'static str, PathBuf); 2] {
-    PYRAMIDS.map(|(name, _)| (name, picture.with_extension(format!("{name}.png"))))
+/// Where the pyramids of a picture lie: `OUT.weighted.png` and `OUT.unweighted.png` beside `OUT.exr`.
+pub fn files(picture: &Path) -> [PathBuf; 2] {
+    PYRAMIDS.map(|(end, _)| picture.with_extension(end))
 }
 
 /// Writes the pyramids of a picture of this size beside it, all tiles with one exposure. Gives their paths.
@@ -77,7 +77,7 @@ pub fn files(picture: &Path) -> [(&'static str, PathBuf); 2] {
 /// Failed, when a file cannot be written.
 pub fn write(picture: &Path, strategies: &[Strategy], size: [u32; 2], factor: f32) -> Result<Vec<PathBuf>, Error> {
     let drawn = PYRAMIDS.map(|(_, pixels)| draw(strategies, size, factor, pixels));
-    let written = drawn.into_iter().zip(files(picture)).map(|((size, rgb), (_, file))| {
+    let written = drawn.into_iter().zip(files(picture)).map(|((size, rgb), file)| {
         write_png(&file, size, &rgb)?;
         Ok(file)
     });

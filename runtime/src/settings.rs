@@ -275,8 +275,8 @@ impl RenderFile {
     /// # Errors
     /// User input, when the pipeline has no strategies.
     pub fn check_layers(&self, plan: &Plan) -> Result<(), Error> {
-        let has = |layer: Aov| plan.layers.iter().any(|group| group.name == layer.to_string());
-        if !self.wants(Aov::Strategies) || has(Aov::Strategies) {
+        let strategies = Aov::Strategies.to_string();
+        if !self.wants(Aov::Strategies) || plan.layers.iter().any(|group| group.name == strategies) {
             return Ok(());
         }
         let pipeline = self.pipeline.as_deref().unwrap_or_default();
@@ -385,6 +385,7 @@ mod tests {
         let tallies = Tallied { counts: vec![3, 1 << 40], slots: 1 << 50, rated_counts: vec![2, 1], rated_slots: 7 };
         let settings = RenderFile {
             spp: Some(16),
+            aov: vec![Aov::Strategies],
             state: Some(State { samples: 16, batches: 8, tallies: Some(tallies) }),
             files: IndexMap::from([("pipelines/mine.toml".to_owned(), "start = \"a\"\n".to_owned())]),
             set: IndexMap::from([("schedule.workgroup".to_owned(), SetValue::Text("128".to_owned()))]),

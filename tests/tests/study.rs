@@ -5,6 +5,7 @@ use runtime::configs::{Axis, Library};
 use runtime::device::{DeviceOptions, Gpu};
 use runtime::error::Error;
 use runtime::image_file::Image;
+use runtime::pyramid;
 use runtime::render::Progress;
 use runtime::settings::RenderFile;
 use runtime::study::{Observer, Outcome, Results, Study, run};
@@ -207,6 +208,20 @@ fn repetitions_have_seeds_of_their_own() {
     assert!(folder.text("report.html").contains(" ± "));
 }
 
+#[test]
+fn a_study_of_strategies_shows_their_pyramids() {
+    let folder = Folder::new("strategies");
+    let variant = "[[variant]]\nname = \"all\"\npipeline = \"sbdpt\"\naov = [\"strategies\"]\n";
+    let scene = "[[scene]]\nname = \"cornell_box\"\nsize = [16, 16]\nspp = 2\nset = { max_edges = 3 }\n";
+    let (outcome, _) = run_small(&folder, &format!("title = \"Pyramids\"\n{variant}{scene}"));
+    let picture = folder.0.join(&outcome.results.runs[0].picture);
+    for file in pyramid::files(&picture) {
+        assert!(file.is_file(), "{} is not there", file.display());
+        let name = file.file_name().expect("the name of a file").to_string_lossy();
+        assert!(folder.text("report.html").contains(&*name), "the report lacks {name}");
+    }
+}
+
 #[track_caller]
 fn refused(test: &str, text: &str, words: &[&str]) {
     let folder = Folder::new(test);
@@ -227,6 +242,11 @@ fn broken_studies_are_refused() {
     refused("reference", &SMALL.replace("= \"pt <b>\"\nreference", "= \"ptt\"\nreference"), &["no variant `ptt`"]);
     refused("set", &SMALL.replace("max_edges = 3", "max_egdes = 3"), &["K0110", "max_egdes", "slit_room"]);
     refused("layer", &SMALL.replace("spp  = 2", "spp = 2\naov = [\"normals\"]"), &["normals", "`variance`"]);
+    refused(
+        "strategies",
+        &SMALL.replace("spp  = 2", "spp = 2\naov = [\"strategies\"]"),
+        &["variant `pt <b>`", "the pipeline `pt` has no strategies to show"],
+    );
     refused("scene", &SMALL.replace("\"slit_room\"", "\"slit_rom\""), &["there is no scene `slit_rom`"]);
 }
 

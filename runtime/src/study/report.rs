@@ -7,6 +7,8 @@ use super::run::difference_path;
 use crate::compare::Image;
 use crate::error::Error;
 use crate::picture::{Exposure, png, to_srgb};
+use crate::pyramid;
+use crate::settings::Aov;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -330,16 +332,25 @@ fn pictures(results: &Results, scene: &str, folder: &Path) -> Result<String, Err
     let factor = Exposure::Percentile.factor(&exposing.radiance);
     let mut figures = String::new();
     if let Some(image) = &reference {
-        figures += &figure("reference", image.size, &exposed(image, factor)?);
+        figures += &figure("reference", &exposed(image, factor)?);
     }
     for run in &runs {
         let image = Image::load(&folder.join(&run.picture))?;
-        figures += &figure(&caption(run), image.size, &exposed(&image, factor)?);
+        figures += &figure(&caption(run), &exposed(&image, factor)?);
     }
+    let doc = "All with one exposure: that of the reference, or of the first picture where there is none.";
     Ok(section(
         &format!("Pictures, scene {scene}"),
-        &(element("div", "class=\"pictures\"", &figures) + &differences(&runs, folder)?),
+        &(gallery(doc, &figures) + &differences(&runs, folder)? + &pyramids(&runs, folder)?),
     ))
+}
+
+/// Figures side by side under a line about them; nothing without figures.
+fn gallery(doc: &str, figures: &str) -> String {
+    if figures.is_empty() {
+        return String::new();
+    }
+    element("p", "", doc) + &element("div", "class=\"pictures\"", figures)
 }
 
 fn load_reference(reference: &Reference, folder: &Path) -> Result<Image, Error> {
@@ -361,17 +372,12 @@ fn caption(run: &Run) -> String {
 fn differences(runs: &[&Run], folder: &Path) -> Result<String, Error> {
     let mut figures = String::new();
     for run in runs {
-        let (Some(errors), Some(size)) = (&run.errors, run.measured.variant.size) else { continue };
-        let path = difference_path(&folder.join(&run.picture));
-        let bytes = std::fs::read(&path)
-            .map_err(|error| Error::failed(format!("cannot read the picture: {error}")).in_file(&path))?;
-        figures += &figure(&difference_caption(run, errors), size, &bytes);
-    }
-    if figures.is_empty() {
-        return Ok(figures);
+        let Some(errors) = &run.errors else { continue };
+        let bytes = read(&difference_path(&folder.join(&run.picture)))?;
+        figures += &figure(&difference_caption(run, errors), &bytes);
     }
     let doc = "Difference from the reference (FLIP): black where nothing differs, white where everything does.";
-    Ok(element("p", "", doc) + &element("div", "class=\"pictures\"", &figures))
+    Ok(gallery(doc, &figures))
 }
 
 fn difference_caption(run: &Run, errors: &Errors) -> String {
@@ -379,15 +385,28 @@ fn difference_caption(run: &Run, errors: &Errors) -> String {
     format!("{}: FLIP {}, relative MSE {}{beyond}", run.variant, shown(errors.flip), shown(errors.relmse))
 }
 
-fn figure(caption: &str, size: [u32; 2], png: &[u8]) -> String {
-    let image = format!(
-        "<img src=\"data:image/png;base64,{}\" width=\"{}\" height=\"{}\" alt=\"{}\">",
-        base64(png),
-        size[0],
-        size[1],
-        escape(caption)
-    );
-    element("figure", "", &(image + &element("figcaption", "", &escape(caption))))
+/// The pyramids of strategies, where they were asked for.
+fn pyramids(runs: &[&Run], folder: &Path) -> Result<String, Error> {
+    let mut figures = String::new();
+    for run in runs.iter().filter(|run| run.wanted.settings.wants(Aov::Strategies)) {
+        for path in pyramid::files(&folder.join(&run.picture)) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            figures += &figure(&name, &read(&path)?);
+        }
+    }
+    let doc = "Strategies of s vertices from the camera and t from a light, a row for each length of path. Weighted they add up to the \
+               picture; unweighted each shows what it would make of the paths of its length alone.";
+    Ok(gallery(doc, &figures))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(path).map_err(|error| Error::failed(format!("cannot read the picture: {error}")).in_file(path))
+}
+
+fn figure(caption: &str, png: &[u8]) -> String {
+    let caption = escape(caption);
+    let image = format!("<img src=\"data:image/png;base64,{}\" alt=\"{caption}\">", base64(png));
+    element("figure", "", &(image + &element("figcaption", "", &caption)))
 }
 
 /// Bytes in the alphabet of data URIs (RFC 4648).
