@@ -292,7 +292,7 @@ fn every_strategy_alone_gives_the_image_of_pt() {
         let longest = if edges < 4 { &all[edges as usize - 1] } else { &*PLATES };
         let expected = difference(&longest.pixels, &all[edges as usize - 2].pixels);
         for eye_vertices in 0..=edges {
-            let samples = if [0, edges].contains(&eye_vertices) { 64 } else { 32 };
+            let samples = if [0, edges].contains(&eye_vertices) { 96 } else { 32 };
             let rendering = alone(&plates_job(&scene, "sbdpt", edges, 0), edges, eye_vertices, samples).render();
             let what = format!("({eye_vertices}, {})", edges - eye_vertices);
             assert_same(&rendering.pixels, &expected, BLOCK, 0.03, &what);

@@ -37,7 +37,8 @@ fn every_layout_gives_the_same_bits() {
         for layout in layouts() {
             let job = job(pipeline).layout(&layout);
             if let Err(refusal) = job.check() {
-                assert!(refusal.contains("no such field"), "{pipeline} with {layout}: {refusal}");
+                let of_another = ["no such field", "is placed nowhere"].iter().any(|reason| refusal.contains(reason));
+                assert!(of_another, "{pipeline} with {layout}: {refusal}");
                 eprintln!("SKIPPED: the layout {layout} does not fit {pipeline}");
                 continue;
             }

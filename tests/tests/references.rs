@@ -57,14 +57,14 @@ fn job(shared: &Path, reference: &Reference, shrink: u32) -> Job {
 
 /// Block means within the combined standard errors: none beyond 6, at most one in 10,000 beyond 4; the whole image within 0.5 % or its noise.
 #[track_caller]
-fn assert_converges_to(name: &str, shrink: u32, samples: u32, leave_out: impl Fn(usize, usize) -> bool) {
+fn assert_converges_to(name: &str, pipeline: &str, shrink: u32, samples: u32) {
     let Some(shared) = shared() else { return };
     let reference = reference(&shared, name);
     let expected = read_reference(&shared.join(format!("references/{name}.exr"))).shrunk(shrink as usize);
-    let mut rendering = job(&shared, &reference, shrink).pipeline("pt").samples(samples).render();
+    let mut rendering = job(&shared, &reference, shrink).pipeline(pipeline).samples(samples).render();
     assert_eq!(rendering.rejected, 0, "{name}: rejected contributions");
     expect_errors(&mut rendering.pixels, &expected, reference.spp * shrink * shrink / samples);
-    assert_agrees(&rendering, &expected, name, leave_out);
+    assert_agrees(&rendering, &expected, &format!("{pipeline} on {name}"));
 }
 
 /// Raises standard errors to those that the reference foretells for so many times fewer samples. Where few paths find light, the
@@ -77,16 +77,9 @@ fn expect_errors(pixels: &mut Pixels, reference: &Pixels, times_fewer: u32) {
 }
 
 #[track_caller]
-fn assert_agrees(rendering: &Rendering, expected: &Pixels, name: &str, leave_out: impl Fn(usize, usize) -> bool) {
-    let columns = expected.width.div_ceil(BLOCK);
+fn assert_agrees(rendering: &Rendering, expected: &Pixels, name: &str) {
     let scores = z_scores(&rendering.pixels.block_estimates(BLOCK), &expected.block_estimates(BLOCK), ROUNDING);
-    let kept: Vec<f64> = scores
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| !leave_out(i / 3 % columns, i / 3 / columns))
-        .map(|(_, score)| *score)
-        .collect();
-    let spread = spread(&kept);
+    let spread = spread(&scores);
     assert!(spread.agrees(), "{name}: blocks {spread:?}");
     let (found, wanted) = (rendering.pixels.mean_estimate(), expected.mean_estimate());
     let noise = 4.0 * (found.error.powi(2) + wanted.error.powi(2)).sqrt();
@@ -94,38 +87,40 @@ fn assert_agrees(rendering: &Rendering, expected: &Pixels, name: &str, leave_out
     assert!(off < noise.max(0.005 * wanted.mean), "{name}: mean {found:?}, reference {wanted:?}");
 }
 
-fn all_blocks(_: usize, _: usize) -> bool {
-    false
-}
-
 #[test]
 fn cornell_box() {
-    assert_converges_to("cornell_box", 4, 1024, all_blocks);
+    assert_converges_to("cornell_box", "pt", 4, 512);
+    assert_converges_to("cornell_box", "sbdpt", 4, 64);
 }
 
 #[test]
 fn cornell_box_direct() {
-    assert_converges_to("cornell_box_direct", 4, 1024, all_blocks);
+    assert_converges_to("cornell_box_direct", "pt", 4, 512);
+    assert_converges_to("cornell_box_direct", "sbdpt", 4, 64);
 }
 
 #[test]
 fn cornell_box_corner() {
-    assert_converges_to("cornell_box_corner", 1, 32, all_blocks);
+    assert_converges_to("cornell_box_corner", "pt", 1, 32);
+    assert_converges_to("cornell_box_corner", "sbdpt", 1, 4);
 }
 
 #[test]
 fn cornell_box_panorama() {
-    assert_converges_to("cornell_box_panorama", 4, 512, all_blocks);
+    assert_converges_to("cornell_box_panorama", "pt", 4, 256);
+    assert_converges_to("cornell_box_panorama", "sbdpt", 4, 32);
 }
 
 #[test]
 fn cbox_hole() {
-    assert_converges_to("cbox_hole", 4, 1024, all_blocks);
+    assert_converges_to("cbox_hole", "pt", 4, 512);
+    assert_converges_to("cbox_hole", "sbdpt", 4, 64);
 }
 
 #[test]
 fn atrium() {
-    assert_converges_to("atrium", 4, 64, all_blocks);
+    assert_converges_to("atrium", "pt", 4, 64);
+    assert_converges_to("atrium", "sbdpt", 4, 16);
 }
 
 /// `bottle_light` is exact but for its chrome ball; a caustic of smooth glass that one lucky path in a thousand finds has block errors
@@ -134,11 +129,13 @@ fn atrium() {
 fn bottle_light_has_the_mean_of_the_reference() {
     let Some(shared) = shared() else { return };
     let reference = reference(&shared, "bottle_light");
-    let rendering = job(&shared, &reference, 4).pipeline("pt").samples(512).render();
-    let (found, wanted) =
-        (rendering.pixels.mean_estimate(), read_reference(&shared.join("references/bottle_light.exr")).mean_estimate());
-    assert_eq!(rendering.rejected, 0);
-    assert!(found.z(&wanted, 0.01 * wanted.mean).abs() < 5.0, "{found:?}, reference {wanted:?}");
+    let wanted = read_reference(&shared.join("references/bottle_light.exr")).mean_estimate();
+    for (pipeline, samples) in [("pt", 256), ("sbdpt", 64)] {
+        let rendering = job(&shared, &reference, 4).pipeline(pipeline).samples(samples).render();
+        let found = rendering.pixels.mean_estimate();
+        assert_eq!(rendering.rejected, 0);
+        assert!(found.z(&wanted, 0.01 * wanted.mean).abs() < 5.0, "{pipeline}: {found:?}, reference {wanted:?}");
+    }
 }
 
 /// Scale 1e6 and 1e-5: the image of `cornell_box`, block means within 1 % at the same random numbers.
@@ -146,7 +143,7 @@ fn bottle_light_has_the_mean_of_the_reference() {
 fn scaled_cornell_boxes_give_its_image() {
     let Some(shared) = shared() else { return };
     let render = |name: &str| {
-        let rendering = Job::of_file(scene(&shared, name)).edges(8).size(64, 64).samples(64).render();
+        let rendering = Job::of_file(scene(&shared, name)).pipeline("pt").edges(8).size(64, 64).samples(64).render();
         assert_eq!(rendering.rejected, 0, "{name}: rejected contributions");
         rendering.pixels.block_estimates(16)
     };
@@ -161,7 +158,8 @@ fn scaled_cornell_boxes_give_its_image() {
 fn far_origin_gives_the_image_of_the_cornell_box() {
     let Some(shared) = shared() else { return };
     let blocks = |name: &str| {
-        Job::of_file(scene(&shared, name)).edges(8).size(64, 64).samples(128).render().pixels.block_estimates(16)
+        let job = Job::of_file(scene(&shared, name)).pipeline("pt").edges(8).size(64, 64);
+        job.samples(128).render().pixels.block_estimates(16)
     };
     assert_blocks_within(&blocks("odd_far_origin"), &blocks("cornell_box"), 0.02, "odd_far_origin");
 }

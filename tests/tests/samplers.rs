@@ -203,7 +203,7 @@ fn errors(render: &Rendering, reference: &Rendering) -> Vec<f64> {
 fn sobol_errs_less_than_independent_numbers() {
     const BOUND: f64 = 0.6;
     let scene = lit_floor();
-    let diffuse = || scene.job().size(32, 32).edges(3);
+    let diffuse = || scene.job().pipeline("pt").size(32, 32).edges(3);
     let reference = diffuse().set("sampler", "sobol").seed(2).samples(2048).render();
     let error = |job: Job| root_mean_square_error(&job.samples(64).render(), &reference);
     let independent = error(diffuse());

@@ -1,4 +1,4 @@
-//! How much room a batched stream has never changes the image: bit for bit with the fixed-point film.
+//! How much room a batched stream has and in what order paths wait never change the image: bit for bit with the fixed-point film.
 
 use tests::rendering::{Job, Rendering, shipped};
 
@@ -38,6 +38,21 @@ fn capacity_and_queue_kind_do_not_meet() {
     assert_same(&atomic, &expected, "atomic queues");
     let batched = job("pt").schedule("inline").set("schedule.batch", "connection").render();
     assert_same(&batched, &expected, "inline with a batched stream");
+}
+
+/// Paths wait as they came or in the order of their slots, and whoever appends them does.
+#[test]
+fn every_order_of_queues_gives_the_same_bits() {
+    for pipeline in ["pt", "sbdpt", "sbdpt_seed"] {
+        let expected = job(pipeline).render();
+        for (queue, order) in
+            [("workgroup", "arrival"), ("workgroup", "slot"), ("subgroup", "slot"), ("atomic", "slot")]
+        {
+            let rendering = job(pipeline).set("schedule.queue", queue).set("schedule.order", order).render();
+            assert_same(&rendering, &expected, &format!("{pipeline}, {queue}, {order}"));
+            assert_eq!(rendering.tallies, expected.tallies, "{pipeline}, {queue}, {order}: tallies");
+        }
+    }
 }
 
 #[test]

@@ -257,6 +257,8 @@ pub struct Schedule {
     pub doc: String,
     /// How a survivor finds its place in the next queue.
     pub queue: QueueKind,
+    /// In what order stages take their paths.
+    pub order: PathOrder,
     /// Threads in a workgroup.
     pub workgroup: Spanned<u32>,
     /// How the film adds.
@@ -277,6 +279,17 @@ pub enum QueueKind {
     Subgroup,
     /// One atomic a workgroup; survivors keep their order in it.
     Workgroup,
+}
+
+/// In what order stages take their paths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PathOrder {
+    /// As they came.
+    Arrival,
+    /// By slot, where several stages of a round feed one: their paths would come one stage after the other. A stage with one feeder
+    /// finds its paths as that found them.
+    Slot,
 }
 
 /// How the film adds.

@@ -1,14 +1,14 @@
 //! The schedule axis and the precision axis.
 
 use super::merge::AxisFile;
-use super::model::{Accumulate, Precision, QueueKind, Real, Schedule};
+use super::model::{Accumulate, PathOrder, Precision, QueueKind, Real, Schedule};
 use super::section::{Findings, Item, Section};
 use super::tree::Data;
 use crate::diagnostic::Diagnostic;
 use crate::source::Spanned;
 
 /// Keys of `[schedule]`.
-pub const KEYS: [&str; 8] = ["fuse", "queue", "workgroup", "load", "until", "accumulate", "batch", "capacity"];
+pub const KEYS: [&str; 9] = ["fuse", "queue", "order", "workgroup", "load", "until", "accumulate", "batch", "capacity"];
 /// Keys of `[precision]`.
 pub const PRECISION_KEYS: [&str; 1] = ["real"];
 
@@ -26,6 +26,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let workgroup = section.require("workgroup", "threads in a workgroup: `workgroup = 64`", findings);
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
+    let order = section.get("order").and_then(|item| item.word(&["arrival", "slot"], findings));
     let batch = section.get("batch").and_then(|item| names(&item, findings));
     let capacity = section.require("capacity", "records per path slot in a batched stream: `capacity = 4`", findings);
     let capacity = capacity.and_then(|item| room(&item, findings));
@@ -33,6 +34,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         name: file.name.clone(),
         doc: file.doc.clone(),
         queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup][queue?],
+        order: [PathOrder::Arrival, PathOrder::Slot][order.unwrap_or_default()],
         workgroup: workgroup?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
         batch: batch.unwrap_or_default(),

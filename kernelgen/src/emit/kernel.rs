@@ -1,7 +1,7 @@
 //! Kernels of stages and of stream consumers, as text.
 
 use super::memory::Access;
-use super::queue::{stage_constant, stream_constant};
+use super::queue::{Queues, stage_constant, stream_constant};
 use super::text::Imports;
 use super::wiring::{WiredStage, WiredStream};
 use indexmap::IndexMap;
@@ -17,7 +17,8 @@ pub(super) enum Source {
     Queue,
 }
 
-const PARAMETERS: &str = "(\n    \
+/// What every kernel over paths or records is told of its place.
+pub(super) const PARAMETERS: &str = "(\n    \
     @builtin(workgroup_id) group: vec3u,\n    \
     @builtin(num_workgroups) groups: vec3u,\n    \
     @builtin(local_invocation_index) lane: u32,\n)";
@@ -28,9 +29,10 @@ pub(super) fn stage_kernel(
     name: &str,
     stage: &WiredStage,
     source: Source,
-    workgroup: u32,
+    queues: &Queues,
     access: &Access,
 ) -> String {
+    let workgroup = queues.workgroup;
     let mut imports = Imports::default();
     imports.add(&stage.entry.module, [stage.entry.name.as_str()]);
     imports.add("pass", ["path_id"]);
@@ -54,8 +56,8 @@ pub(super) fn stage_kernel(
     for buffer in &access.buffers {
         imports.add("tables", [buffer.as_str(), format!("{buffer}_address").as_str()]);
     }
-    let call = call(stage, &mut imports);
-    let enqueue = enqueue(stage, &mut imports);
+    let call = call(stage);
+    let enqueue = enqueue(stage, queues, &mut imports);
     let mut text = String::new();
     let _ = write!(
         text,
@@ -78,7 +80,7 @@ pub(super) fn stage_kernel(
     for store in &access.stores {
         let _ = writeln!(text, "        {store}");
     }
-    let _ = write!(text, "    }}\n{enqueue}}}\n");
+    let _ = write!(text, "    }}\n{enqueue}{}}}\n", add_tallies(stage.counts, &mut imports));
     format!("{imports}\n{text}")
 }
 
@@ -103,18 +105,17 @@ fn push_instances(text: &mut String, stage: &WiredStage, access: &Access, import
     }
 }
 
-fn call(stage: &WiredStage, imports: &mut Imports) -> String {
+fn call(stage: &WiredStage) -> String {
     let arguments: Vec<String> = stage.instances.iter().map(|(instance, _)| format!("&{instance}")).collect();
     let call = format!("{}({})", stage.entry.name, arguments.join(", "));
     if stage.routes.is_empty() {
         return format!("_ = {call};");
     }
-    imports.add("queue", ["enqueue"]);
     format!("outcome = {call};")
 }
 
 /// A line for every stage that an outcome leads to.
-fn enqueue(stage: &WiredStage, imports: &mut Imports) -> String {
+fn enqueue(stage: &WiredStage, queues: &Queues, imports: &mut Imports) -> String {
     let mut targets: IndexMap<&str, Vec<String>> = IndexMap::new();
     for (outcome, target) in &stage.routes {
         targets.entry(target).or_default().push(outcome.to_uppercase());
@@ -128,7 +129,14 @@ fn enqueue(stage: &WiredStage, imports: &mut Imports) -> String {
         imports.add("outcome", outcomes.iter().map(String::as_str));
         imports.add("queue", [constant.as_str()]);
         let tests: Vec<String> = outcomes.iter().map(|outcome| format!("outcome == {outcome}")).collect();
-        let _ = writeln!(text, "    enqueue({constant}, {}, path_id, lane);", tests.join(" || "));
+        let wanted = tests.join(" || ");
+        let _ = if queues.is_ordered(target) {
+            imports.add("queue", ["wait_for"]);
+            writeln!(text, "    if {wanted} {{\n        wait_for({constant}, path_id);\n    }}")
+        } else {
+            imports.add("queue", ["enqueue"]);
+            writeln!(text, "    enqueue({constant}, {wanted}, path_id, lane);")
+        };
     }
     text
 }
@@ -141,6 +149,7 @@ pub(super) fn consumer_kernel(kernel: &str, name: &str, stream: &WiredStream, wo
     imports.add("control", ["running"]);
     imports.add("queue", [constant.as_str()]);
     imports.add("streams", [format!("load_{name}").as_str()]);
+    let counts = add_tallies(stream.counts, &mut imports);
     format!(
         "{imports}\n\
          /// Consumer `{consumer}` of the stream `{name}`.\n\
@@ -150,10 +159,19 @@ pub(super) fn consumer_kernel(kernel: &str, name: &str, stream: &WiredStream, wo
              if index < running({constant}) {{\n        \
                  var {name} = load_{name}(index);\n        \
                  {consumer}(&{name});\n    \
-             }}\n\
+             }}\n{counts}\
          }}\n",
         consumer = stream.entry.name,
     )
+}
+
+/// The line that adds what a workgroup has counted to the tallies.
+fn add_tallies(counts: bool, imports: &mut Imports) -> &'static str {
+    if !counts {
+        return "";
+    }
+    imports.add("tallies", ["add_tallies"]);
+    "\n    add_tallies(lane);\n"
 }
 
 /// Names that the generated kernels use themselves: no instance and no stream can have them.
@@ -175,5 +193,6 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "enqueue",
         "running",
         "pass_info",
+        "waits_for",
     ])
 }

@@ -19,7 +19,7 @@ mod wiring;
 use crate::analyze::{self, Leaf, Liveness};
 use crate::config;
 use crate::config::evaluate_rounds;
-use crate::config::model::{Selection, Variant};
+use crate::config::model::{PathOrder, Selection, Variant};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::layout::{self, Placement, StateLeaf};
 use crate::link::Modules;
@@ -135,7 +135,7 @@ fn add_config_modules(
         ("control", queue::control_module(&queues)),
         ("film", film::module(variant.schedule.accumulate, layers)),
         ("streams", stream::analysis_module(pipeline)),
-        ("tallies", tally::module(pipeline, tallies)),
+        ("tallies", tally::module(pipeline, tallies, variant.schedule.workgroup.value)),
     ];
     for (name, text) in texts {
         add_module(sources, modules, name, text);
@@ -179,8 +179,11 @@ fn add_state_modules(
 
 fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
     let batched = wiring.streams.iter().filter(|(_, stream)| stream.batched);
+    let stages: Vec<String> = wiring.stages.keys().filter(|stage| wiring.is_looped(stage)).cloned().collect();
+    let mixed = |stage: &&String| variant.schedule.order == PathOrder::Slot && wiring.feeders(stage) > 1;
     Queues {
-        stages: wiring.stages.keys().filter(|stage| wiring.is_looped(stage)).cloned().collect(),
+        ordered: stages.iter().filter(mixed).cloned().collect(),
+        stages,
         streams: batched.map(|(name, _)| name.clone()).collect(),
         workgroup: variant.schedule.workgroup.value,
     }

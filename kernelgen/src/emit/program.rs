@@ -120,6 +120,9 @@ impl Builder<'_> {
             self.prepare(&name, &prepared, &mut body);
             body.extend(streams.into_iter().filter_map(|stream| consumers.get(stream)).cloned());
             for stage in group {
+                if queues.is_ordered(&stage) {
+                    body.push(self.order(&stage));
+                }
                 let kernel = self.stage(&stage, Source::Queue);
                 body.push(Step::Indirect { kernel, slot: queues.of_stage(&stage).unwrap_or_default() });
             }
@@ -154,11 +157,11 @@ impl Builder<'_> {
 
     fn prepared_stage(&self, stage: &str) -> Prepared {
         let rays = self.program.wiring.stages[stage].rays;
-        Prepared { entries: Entries::Stage(stage.to_owned()), rays }
+        Prepared { entries: Entries::Stage(stage.to_owned()), rays, ordered: self.program.queues.is_ordered(stage) }
     }
 
     fn prepared_stream(&self, name: &str, entries: Entries) -> Prepared {
-        Prepared { entries, rays: self.program.wiring.streams[name].rays }
+        Prepared { entries, rays: self.program.wiring.streams[name].rays, ordered: false }
     }
 
     /// Empties a stream before a group of stages if this group and those after it might overfill it.
@@ -176,6 +179,14 @@ impl Builder<'_> {
         body.push(Step::Single { kernel });
     }
 
+    /// Puts the paths that wait for a stage in the order of their slots.
+    fn order(&mut self, stage: &str) -> Step {
+        let name = format!("order_{stage}");
+        let workgroup = self.program.queues.workgroup;
+        let kernel = self.housekeeping(&name, queue::order_kernel(&name, stage, workgroup), workgroup);
+        Step::Dispatch { kernel }
+    }
+
     fn housekeeping(&mut self, name: &str, text: String, workgroup: u32) -> usize {
         self.compile(Draft { name: name.to_owned(), text, workgroup, ..Draft::default() })
     }
@@ -189,11 +200,10 @@ impl Builder<'_> {
         };
         let starts_again = source == Source::Slots && program.wiring.is_looped(name);
         let kernel = if starts_again { format!("{name}_first") } else { name.to_owned() };
-        let workgroup = program.variant.schedule.workgroup.value;
         self.compile(Draft {
-            text: kernel::stage_kernel(&kernel, name, stage, source, workgroup, &access),
+            text: kernel::stage_kernel(&kernel, name, stage, source, program.queues, &access),
             name: kernel,
-            workgroup,
+            workgroup: program.queues.workgroup,
             stages: vec![name.to_owned()],
             load_bytes: access.load_bytes,
             store_bytes: access.store_bytes,
@@ -335,6 +345,7 @@ impl Builder<'_> {
         let film = Size { per_pixel: 3 * channel * u64::from(plan::planes(program.layers)), ..Size::default() };
         buffers.extend([
             buffer("queue", Role::Queue, per_path(4 * program.queues.stages.len() as u32)),
+            buffer("waits_for", Role::Queue, per_path(4)),
             buffer("control", Role::Control, fixed(4 * program.queues.control_words())),
             buffer("arguments", Role::Arguments, fixed(12 * program.queues.count().max(1))),
         ]);

@@ -1,5 +1,6 @@
 //! Queues and counters: the modules `control` and `queue`, and the kernels that run between the stages.
 
+use super::kernel::PARAMETERS;
 use super::stream::room_function;
 use super::text::Imports;
 use crate::config::model::{QueueKind, RayKind};
@@ -20,6 +21,8 @@ pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
 pub(super) struct Queues {
     /// Stages, in the order in which a round runs them.
     pub stages: Vec<String>,
+    /// Those of them that take their paths in the order of slots.
+    pub ordered: Vec<String>,
     /// Batched streams.
     pub streams: Vec<String>,
     /// Threads in a workgroup of the kernels that take from them.
@@ -41,6 +44,11 @@ impl Queues {
     pub(super) fn of_stream(&self, stream: &str) -> Option<u32> {
         let index = self.streams.iter().position(|name| name == stream)?;
         Some((self.stages.len() + index) as u32)
+    }
+
+    /// Whether a stage takes its paths in the order of slots.
+    pub(super) fn is_ordered(&self, stage: &str) -> bool {
+        self.ordered.iter().any(|name| name == stage)
     }
 
     /// Words of the control buffer.
@@ -108,7 +116,7 @@ fn count_ray(word: u32) {
 pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
     let mut text = String::from(
         "import package::control::{control, waiting, waiting_word};\n\
-         import package::pass::path_count;\n\n",
+         import package::pass::{path_count, pass_info};\n\n",
     );
     for (stage, number) in queues.stages.iter().zip(0..) {
         let _ = writeln!(text, "const {}: u32 = {number}u;", stage_constant(stage));
@@ -122,11 +130,17 @@ pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
         queues.workgroup.div_ceil(32)
     );
     text.push_str(QUEUE);
+    if kind == QueueKind::Workgroup || !queues.ordered.is_empty() {
+        text.push_str(PLACE_SIDE_BY_SIDE);
+    }
     text.push_str(match kind {
         QueueKind::Atomic => ENQUEUE_ATOMIC,
         QueueKind::Subgroup => ENQUEUE_SUBGROUP,
         QueueKind::Workgroup => ENQUEUE_WORKGROUP,
     });
+    if !queues.ordered.is_empty() {
+        text.push_str(ORDER);
+    }
     text.push_str(APPEND);
     let _ = write!(
         text,
@@ -172,15 +186,15 @@ fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
 }
 ";
 
-const ENQUEUE_WORKGROUP: &str = r"
+const PLACE_SIDE_BY_SIDE: &str = r"
 /// One bit an invocation: which of them go on.
 var<workgroup> survivors: array<atomic<u32>, WORKGROUP_WORDS>;
 /// Where the survivors' places begin.
 var<workgroup> survivors_base: u32;
 
-/// Appends this path to a queue where `wanted`, with one atomic a workgroup; `lane` numbers its invocations. Neighbours stay
-/// neighbours, so later stages find their state side by side. To be called by all invocations of a workgroup.
-fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
+/// Appends this path to a queue where `wanted`, with one atomic a workgroup on the control word `counter`; `lane` numbers its
+/// invocations. Neighbours stay neighbours. To be called by all invocations of a workgroup.
+fn place_side_by_side(number: u32, counter: u32, wanted: bool, path: u32, lane: u32) {
     if lane < WORKGROUP_WORDS {
         atomicStore(&survivors[lane], 0u);
     }
@@ -196,7 +210,7 @@ fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
         }
         survivors_base = 0u;
         if count > 0u {
-            survivors_base = atomicAdd(&control[waiting_word(number)], count);
+            survivors_base = atomicAdd(&control[counter], count);
         }
     }
     workgroupBarrier();
@@ -208,6 +222,39 @@ fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
         queue[number * path_count + place] = path;
     }
     workgroupBarrier();
+}
+";
+
+const ENQUEUE_WORKGROUP: &str = r"
+/// Appends this path to a queue where `wanted`, with one atomic a workgroup: later stages find the state of neighbours side by side.
+/// To be called by all invocations of a workgroup.
+fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
+    place_side_by_side(number, waiting_word(number), wanted, path, lane);
+}
+";
+
+const ORDER: &str = r"
+/// The queue that a path waits for, plus one; 0: none that is put in order.
+var<storage, read_write> waits_for: array<u32>;
+
+/// Lets this path wait for a queue that is put in order.
+fn wait_for(number: u32, path: u32) {
+    atomicAdd(&control[waiting_word(number)], 1u);
+    waits_for[path] = number + 1u;
+}
+
+/// Takes this path into a queue if it waits for that. To be called by all invocations of a workgroup.
+fn take_in_order(number: u32, path: u32, lane: u32) {
+    let wanted = path < pass_info.slots && waits_for[path] == number + 1u;
+    if wanted {
+        waits_for[path] = 0u;
+    }
+    place_side_by_side(number, waiting_word(number) + 1u, wanted, path, lane);
+}
+
+/// Makes the kernel of a queue take what is then put into it, instead of what waits in it.
+fn open_order(number: u32) {
+    atomicStore(&control[waiting_word(number) + 1u], 0u);
 }
 ";
 
@@ -299,11 +346,23 @@ pub(super) struct Prepared {
     pub entries: Entries,
     /// What its rays are counted as.
     pub rays: Option<RayKind>,
+    /// Whether the paths are put in order before their kernel runs.
+    pub ordered: bool,
 }
 
 impl Prepared {
-    /// The statement that does it.
-    fn statement(&self, imports: &mut Imports) -> String {
+    /// The statements that do it.
+    fn statements(&self, imports: &mut Imports) -> String {
+        let mut text = self.counted(imports);
+        if let (Entries::Stage(stage), true) = (&self.entries, self.ordered) {
+            imports.add("queue", ["open_order"]);
+            let _ = writeln!(text, "    open_order({});", stage_constant(stage));
+        }
+        text
+    }
+
+    /// The call, and its rays counted.
+    fn counted(&self, imports: &mut Imports) -> String {
         let call = self.call(imports);
         let Some(kind) = self.rays else { return format!("    {call};\n") };
         let (item, word) = match kind {
@@ -363,7 +422,7 @@ pub(super) fn prepare_kernel(name: &str, first_of_round: bool, queues: &[Prepare
         body.push_str("    atomicAdd(&control[CONTROL_ROUND], 1u);\n");
     }
     for prepared in queues {
-        body.push_str(&prepared.statement(&mut imports));
+        body.push_str(&prepared.statements(&mut imports));
     }
     format!(
         "{imports}\n\
@@ -373,11 +432,26 @@ pub(super) fn prepare_kernel(name: &str, first_of_round: bool, queues: &[Prepare
     )
 }
 
+/// The kernel that collects the paths that wait for a stage in the order of their slots.
+pub(super) fn order_kernel(name: &str, stage: &str, workgroup: u32) -> String {
+    let constant = stage_constant(stage);
+    let mut imports = Imports::default();
+    imports.add("queue", ["take_in_order", constant.as_str()]);
+    format!(
+        "{imports}\n\
+         /// Puts the paths that wait for `{stage}` in the order of their slots.\n\
+         @compute @workgroup_size({workgroup})\n\
+         fn {name}_main{PARAMETERS} {{\n    \
+             take_in_order({constant}, (group.y * groups.x + group.x) * {workgroup}u + lane, lane);\n\
+         }}\n"
+    )
+}
+
 /// The kernel after the loop: whatever path still waits was cut off, and what is left in the streams is handed to their consumers.
 pub(super) fn finish_kernel(queues: &Queues, streams: &[Prepared]) -> String {
     let mut imports = Imports::default();
     imports.add("control", ["control", "waiting", "CONTROL_UNFINISHED"]);
-    let body: String = streams.iter().map(|prepared| prepared.statement(&mut imports)).collect();
+    let body: String = streams.iter().map(|prepared| prepared.statements(&mut imports)).collect();
     format!(
         "{imports}\n\
          /// Counts the paths that still wait: more than none means that the rounds did not suffice. Then empties the streams.\n\

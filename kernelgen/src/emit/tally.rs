@@ -11,10 +11,13 @@ pub(super) const COUNTS: &str = "tally_counts";
 /// The WGSL name of the buffer of rates.
 pub(super) const RATES: &str = "tally_rates";
 
+/// Counters that a workgroup has room for: half of the 16 KiB that every adapter grants.
+const MOST_WORDS: u32 = 2048;
+
 /// The tallies of a pipeline, one behind the other.
 ///
 /// # Errors
-/// K0116 a size that cannot be evaluated.
+/// K0116 a size that cannot be evaluated, or more counters than a workgroup has room for.
 pub(super) fn tallies(pipeline: &Pipeline) -> Result<Vec<Tally>, Diagnostic> {
     let mut tallies = Vec::new();
     let mut first = 0;
@@ -22,6 +25,11 @@ pub(super) fn tallies(pipeline: &Pipeline) -> Result<Vec<Tally>, Diagnostic> {
         let size = evaluate_size(pipeline, &declared.size)?;
         tallies.push(Tally { name: name.clone(), first, size });
         first = size.saturating_add(first);
+        if first > MOST_WORDS {
+            return Err(Diagnostic::error("K0116", format!("the tallies up to `{name}` have {first} counters"))
+                .at(declared.size.span, format!("{size} of them"))
+                .help(format!("a workgroup counts on its own and has room for {MOST_WORDS}")));
+        }
     }
     Ok(tallies)
 }
@@ -31,8 +39,9 @@ pub(super) fn words(tallies: &[Tally]) -> u64 {
     tallies.iter().map(|tally| u64::from(tally.size)).sum()
 }
 
-/// The module. An index beyond the last counts as the last: it must not reach into the next tally.
-pub(super) fn module(pipeline: &Pipeline, tallies: &[Tally]) -> String {
+/// The module. An index beyond the last counts as the last: it must not reach into the next tally. Workgroups count on their own
+/// and add up at the end: all invocations of a device on one word would wait for one another.
+pub(super) fn module(pipeline: &Pipeline, tallies: &[Tally], workgroup: u32) -> String {
     let mut text = format!(
         "import package::real::real;\n\n\
          /// Counts of the present samples, tally by tally.\n\
@@ -40,6 +49,24 @@ pub(super) fn module(pipeline: &Pipeline, tallies: &[Tally]) -> String {
          /// Counts of earlier samples divided by the number of their paths.\n\
          var<storage, read> {RATES}: array<f32>;\n"
     );
+    let words = words(tallies);
+    if words > 0 {
+        let _ = write!(
+            text,
+            "\n/// Counts of this workgroup.\n\
+             var<workgroup> tally_share: array<atomic<u32>, {words}>;\n\n\
+             /// Adds what this workgroup has counted; `lane` numbers its invocations, which must all call it, last of all.\n\
+             fn add_tallies(lane: u32) {{\n    \
+                 workgroupBarrier();\n    \
+                 for (var word = lane; word < {words}u; word += {workgroup}u) {{\n        \
+                     let counted = atomicLoad(&tally_share[word]);\n        \
+                     if counted > 0u {{\n            \
+                         atomicAdd(&{COUNTS}[word], counted);\n        \
+                     }}\n    \
+                 }}\n\
+             }}\n"
+        );
+    }
     for tally in tallies {
         let doc = pipeline.tallies.get(&tally.name).map_or("", |declared| declared.doc.as_str());
         push_functions(&mut text, tally, doc);
@@ -56,7 +83,7 @@ fn push_functions(text: &mut String, tally: &Tally, doc: &str) {
         text,
         "\n/// Counts at an index of `{name}`{colon}{doc}\n\
          fn count_{name}(index: u32) {{\n    \
-             atomicAdd(&{COUNTS}[{word}], 1u);\n\
+             atomicAdd(&tally_share[{word}], 1u);\n\
          }}\n\n\
          /// How often a path of the earlier samples counted at an index of `{name}`.\n\
          fn {name}_rate(index: u32) -> real {{\n    \

@@ -292,6 +292,44 @@ fn a_stream_without_room_for_a_round_is_refused() {
     assert!(text.contains("write a capacity of 0.001 or more"), "{text}");
 }
 
+/// Walks that miss start anew: `trace` gets its paths from two stages then.
+fn with_two_feeders(order: &str) -> Plan {
+    let pipeline = PIPELINE.replace("on.miss = \"end\"", "on.miss = \"emit\"");
+    assert_ne!(pipeline, PIPELINE);
+    let result = crate::generate(&sources(&pipeline, LAYOUT, STAGES), &selection(&[("schedule.order", order)]));
+    result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan
+}
+
+#[test]
+fn paths_that_come_from_several_stages_are_put_in_order() {
+    let plan = with_two_feeders("slot");
+    let Some(Step::Loop { body, .. }) = plan.program.get(2) else { panic!("{:?}", plan.program) };
+    let expected = [
+        "prepare_emit",
+        "emit",
+        "prepare_trace",
+        "order_trace",
+        "trace",
+        "prepare_shade",
+        "resolve_connection",
+        "shade",
+    ];
+    assert_eq!(names(&plan, body), expected);
+    for feeder in ["emit_first", "emit", "shade"] {
+        assert!(kernel(&plan, feeder).module.contains("wait_for(QUEUE_TRACE, path_id);"), "{feeder}");
+    }
+    assert!(kernel(&plan, "trace").module.contains("enqueue(QUEUE_SHADE,"));
+    assert!(kernel(&plan, "prepare_trace").module.contains("open_order(QUEUE_TRACE);"));
+}
+
+#[test]
+fn paths_that_come_from_one_stage_are_not_put_in_order() {
+    for plan in [generated(&[("schedule.order", "slot")]).plan, with_two_feeders("arrival")] {
+        assert!(plan.kernels.iter().all(|kernel| !kernel.module.contains("waits_for")));
+        assert!(plan.buffers.iter().all(|buffer| buffer.name != "waits_for"));
+    }
+}
+
 #[test]
 fn a_start_stage_that_is_routed_to_has_two_kernels() {
     let pipeline = PIPELINE.replace("on.scattered = \"trace\"", "on.scattered = \"emit\"");
@@ -419,7 +457,15 @@ fn tallies_have_their_parts_of_two_buffers() {
     }
     let shade = &kernel(&plan, "shade").module;
     assert!(shade.contains("/// Counts at an index of `bounces`: Bounces."), "{shade}");
-    assert!(shade.contains("atomicAdd(&tally_counts[3u + min(index, 5u)], 1u);"), "{shade}");
+    assert!(shade.contains("atomicAdd(&tally_share[3u + min(index, 5u)], 1u);"), "{shade}");
+    // Whoever counts adds up for its workgroup, out of every branch; the others know nothing of it.
+    assert!(
+        shade.contains(
+            "\n    }\n\n    enqueue(QUEUE_TRACE, outcome == SCATTERED, path_id, lane);\n\n    add_tallies(lane);\n}"
+        ),
+        "{shade}"
+    );
+    assert!(!kernel(&plan, "trace").module.contains("tally"));
 }
 
 #[test]
@@ -441,6 +487,7 @@ fn wrong_tallies_are_refused() {
     assert_eq!(code("bounces = { size = \"max_edge\" }"), ["K0116"]);
     assert_eq!(code("bounces = { size = \"max_edges - 5\" }"), ["K0116"]);
     assert_eq!(code("bounces = { size = \"131073\" }"), ["K0116"]);
+    assert_eq!(code("other = { size = \"2048\" }\nbounces = { size = \"1\" }"), ["K0116"]);
     assert_eq!(code("bounces = { doc = \"no size\" }"), ["K0112"]);
     assert_eq!(code("bounces = { size = 3 }"), ["K0106"]);
     assert_eq!(code("bounces = { size = \"3\", span = 3 }"), ["K0102"]);

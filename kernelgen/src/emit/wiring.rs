@@ -49,6 +49,8 @@ pub(super) struct WiredStage {
     /// Returned outcomes (lower case) and the stages they lead to; those that end the path are left out.
     pub routes: Vec<(String, String)>,
     pub rays: Option<RayKind>,
+    /// Whether it counts something in a tally.
+    pub counts: bool,
 }
 
 /// A stream with its consumer.
@@ -63,12 +65,20 @@ pub(super) struct WiredStream {
     /// Most records of a path between two moments at which a batched stream may be emptied.
     pub most: u32,
     pub rays: Option<RayKind>,
+    /// Whether its consumer counts something in a tally.
+    pub counts: bool,
 }
 
 impl Wiring {
     /// Whether the loop runs this stage: every stage but one that only starts paths.
     pub(super) fn is_looped(&self, stage: &str) -> bool {
         self.stages.values().any(|other| other.routes.iter().any(|(_, target)| target == stage))
+    }
+
+    /// How many stages of the loop lead to this one.
+    pub(super) fn feeders(&self, stage: &str) -> usize {
+        let leads = |other: &WiredStage| other.routes.iter().any(|(_, target)| target == stage);
+        self.stages.iter().filter(|(name, other)| self.is_looped(name) && leads(other)).count()
     }
 
     /// The graph for liveness.
@@ -133,6 +143,8 @@ struct Analysed {
     facts: StageFacts,
     /// Whether the text may have lost code to an absent effect.
     pruned: bool,
+    /// Whether it counts something in a tally.
+    counts: bool,
 }
 
 impl Wirer<'_> {
@@ -222,6 +234,7 @@ impl Wirer<'_> {
             facts: analysed.facts,
             routes,
             rays: stage.rays,
+            counts: analysed.counts,
         })
     }
 
@@ -245,9 +258,10 @@ impl Wirer<'_> {
         let facts = analyze::stage_facts(&module, &linked, &entry.name, bind, &outcomes.collect())?;
         let pruned = linked.constants_seen.iter().any(|name| self.is_absent(name));
         self.wiring.effects_seen.extend(linked.constants_seen);
+        let counts = linked.items.iter().any(|(module, item)| module == "tallies" && item.starts_with("count_"));
         let of_film = linked.items.into_iter().filter(|(module, _)| module == "film");
         self.wiring.splats.extend(of_film.map(|(_, item)| item));
-        Ok(Analysed { entry, signature, facts, pruned })
+        Ok(Analysed { entry, signature, facts, pruned, counts })
     }
 
     fn check_outcomes(&mut self, name: &str, stage: &Stage, analysed: &Analysed) -> Result<(), Vec<Diagnostic>> {
@@ -306,10 +320,19 @@ impl Wirer<'_> {
             }
             match self.wire_stream(name, stream) {
                 Ok(wired) => {
+                    self.pass_counting_on(name, &wired);
                     self.wiring.streams.insert(name.clone(), wired);
                 }
                 Err(findings) => self.findings.extend(findings),
             }
+        }
+    }
+
+    /// A consumer that runs where records are pushed counts in the kernels that push.
+    fn pass_counting_on(&mut self, name: &str, stream: &WiredStream) {
+        let counts = stream.counts && !stream.batched;
+        for stage in self.wiring.stages.values_mut().filter(|stage| stage.facts.pushes.contains_key(name)) {
+            stage.counts |= counts;
         }
     }
 
@@ -331,6 +354,7 @@ impl Wirer<'_> {
             pushes,
             most,
             rays: stream.rays,
+            counts: analysed.counts,
         })
     }
 

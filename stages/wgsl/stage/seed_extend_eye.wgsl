@@ -52,7 +52,7 @@ fn seed_extend_eye(eye: ptr<function, Walk>, light: ptr<function, Walk>, vertex:
         return ENDED;
     }
     if !frozen_reverse_pdfs {
-        eye.mis = closed_by_event(sum, reverse_pdf_of_sample(bsdf, outgoing, sample), sample.delta);
+        eye.mis = closed_by_event(sum, reverse_pdf_of_sample(bsdf, outgoing, sample), sample);
     }
     seed_depart(eye, surface, sample);
     return SCATTERED;

@@ -41,7 +41,7 @@ fn seed_extend_light(light: ptr<function, Walk>, vertex: ptr<function, Vertex>, 
         light.mis = closed(sum, assumed_reverse_pdf(bsdf, outgoing, camera));
     }
     if is_connectable(bsdf) {
-        join_lens(light, surface, bsdf, sum, t);
+        join_camera(light, surface, bsdf, sum, t);
     }
     return send_light_ray(light, surface, bsdf, t);
 }
@@ -55,7 +55,7 @@ fn arrives_parallel(light: ptr<function, Walk>) -> bool {
 }
 
 /// Offers the light that y_t sends to the camera: strategy (0, t).
-fn join_lens(light: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sum: PartialSum, t: u32) {
+fn join_camera(light: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sum: PartialSum, t: u32) {
     let camera = connect_camera(surface.position, random4(WALK_LIGHT, t, DIMENSION_CHOICE).xy);
     if !camera.valid {
         return;

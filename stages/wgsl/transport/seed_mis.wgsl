@@ -11,7 +11,7 @@ import package::features::{HAS_DELTA, HAS_TRANSMISSION};
 import package::params::{clamp_contribution, counting, counting_first, frozen_reverse_pdfs, last_ray, last_ray_none, max_edges, n_kk};
 import package::math::vector::max_component;
 import package::surface::surface::Surface;
-import package::bsdf::bsdf::{Bsdf, reverse_pdf_bsdf};
+import package::bsdf::bsdf::{Bsdf, BsdfSample, reverse_pdf_bsdf};
 import package::transport::advance::surface_cosine;
 import package::transport::recursive_mis::{LARGEST_SUM, SMALLEST_SUM};
 
@@ -72,8 +72,12 @@ fn closed(sum: PartialSum, reverse_pdf: real) -> real {
 }
 
 /// d of a vertex from which the path goes on by a sampled event of density `reverse_pdf` in reverse. A delta lobe joins nothing.
-fn closed_by_event(sum: PartialSum, reverse_pdf: real, delta: bool) -> real {
-    return min(select(sum.nearest, 0.0, delta) + reverse_pdf * sum.farther, LARGEST_SUM);
+fn closed_by_event(sum: PartialSum, reverse_pdf: real, event: BsdfSample) -> real {
+    var nearest = sum.nearest;
+    if HAS_DELTA {
+        nearest = select(nearest, 0.0, event.delta);
+    }
+    return min(nearest + reverse_pdf * sum.farther, LARGEST_SUM);
 }
 
 /// Density, 1/sr, of scattering to `outgoing` what comes from the assumed partner in the direction `partner`. On an opaque surface a

@@ -32,7 +32,12 @@ fn seed_depart(walk: ptr<function, Walk>, surface: Surface, sample: BsdfSample) 
 
 /// The sample leads nowhere, or with a smaller density than is wanted. A delta lobe's density is infinite.
 fn is_lost(sample: BsdfSample) -> bool {
-    return is_absorbed(sample) || (!sample.delta && sample.pdf < pdf_min);
+    if HAS_DELTA {
+        if sample.delta {
+            return is_absorbed(sample);
+        }
+    }
+    return is_absorbed(sample) || sample.pdf < pdf_min;
 }
 
 /// y_1 as it is stored.
@@ -62,5 +67,5 @@ fn sum_of_sent_ray(light: ptr<function, Walk>, vertex: ptr<function, Vertex>) ->
     if HAS_DELTA {
         event.delta = (light.flags & FLAGS_SPECULAR) != 0u;
     }
-    return closed_by_event(stored_sum(light), reverse_pdf_of_sample(bsdf, outgoing, event), event.delta);
+    return closed_by_event(stored_sum(light), reverse_pdf_of_sample(bsdf, outgoing, event), event);
 }
