@@ -35,6 +35,8 @@ pub struct Tallied {
 pub struct Tallies {
     counts: Option<wgpu::Buffer>,
     rates: Option<wgpu::Buffer>,
+    /// Where each tally begins.
+    firsts: Vec<usize>,
     pilot: Vec<u64>,
     tallied: Tallied,
     /// Slots submitted since the counts were last taken over.
@@ -49,6 +51,7 @@ impl Tallies {
         (words > 0).then(|| Self {
             counts: buffers.of(plan, Role::TallyCounts).ok().cloned(),
             rates: buffers.of(plan, Role::TallyRates).ok().cloned(),
+            firsts: plan.tallies.iter().map(|tally| tally.first as usize).collect(),
             pilot: zeros.clone(),
             tallied: Tallied { counts: zeros.clone(), slots: 0, rated_counts: zeros, rated_slots: 0 },
             pending: 0,
@@ -89,7 +92,7 @@ impl Tallies {
 
     /// Rates of 1 for the pilot, which has no samples before it.
     pub fn begin_pilot(&self, gpu: &Gpu) {
-        self.write_rates(gpu, &vec![1.0; self.pilot.len()]);
+        self.write_rates(gpu, vec![1.0; self.pilot.len()]);
     }
 
     /// Takes over what the pilot counted and publishes the first rates. No pass may be in flight.
@@ -133,14 +136,16 @@ impl Tallies {
     fn publish(&self, gpu: &Gpu) {
         let slots = (u64::from(PILOT_SLOTS) + self.tallied.rated_slots) as f64;
         let counts = self.pilot.iter().zip(&self.tallied.rated_counts);
-        let rates: Vec<f32> = counts.map(|(pilot, rated)| ((pilot + rated) as f64 / slots) as f32).collect();
-        self.write_rates(gpu, &rates);
+        self.write_rates(gpu, counts.map(|(pilot, rated)| (pilot + rated) as f64 / slots).collect());
     }
 
-    fn write_rates(&self, gpu: &Gpu, rates: &[f32]) {
-        if let Some(buffer) = &self.rates {
-            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(rates));
-        }
+    /// Writes the rates, then their sums within each tally.
+    fn write_rates(&self, gpu: &Gpu, mut rates: Vec<f64>) {
+        let Some(buffer) = &self.rates else { return };
+        let sums = running_sums(&rates, &self.firsts);
+        rates.extend(sums);
+        let words: Vec<f32> = rates.into_iter().map(|rate| rate as f32).collect();
+        gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&words));
     }
 
     /// Reads the counts on the device and zeroes them.
@@ -150,5 +155,25 @@ impl Tallies {
         let bytes = gpu.read(buffer)?;
         gpu.queue.write_buffer(buffer, 0, &vec![0; words * 4]);
         Ok(bytes.chunks_exact(4).take(words).map(|word| u64::from(bytemuck::pod_read_unaligned::<u32>(word))).collect())
+    }
+}
+
+/// Sums up to each place, each of `firsts` beginning anew.
+fn running_sums(values: &[f64], firsts: &[usize]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let add = |(place, value): (usize, &f64)| {
+        sum = if firsts.contains(&place) { *value } else { sum + value };
+        sum
+    };
+    values.iter().enumerate().map(add).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_begin_anew_with_each_tally() {
+        assert_eq!(running_sums(&[1.0, 2.0, 3.0, 4.0, 5.0], &[0, 3]), [1.0, 3.0, 6.0, 4.0, 9.0]);
     }
 }

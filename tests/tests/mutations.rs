@@ -558,8 +558,8 @@ fn errors_of_bidirectional_weights() {
         Mutation {
             name: "the implicit strategy counts as twice as many samples",
             module: "transport/strategy",
-            old: "var samples = real(1.0);",
-            new: "var samples = real(2.0);",
+            old: "return samples;",
+            new: "return 2.0 * samples;",
             check: &NEAR_PANELS_FROM_BOTH_SIDES,
         },
         Mutation {

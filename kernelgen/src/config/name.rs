@@ -6,7 +6,7 @@ use crate::source::Span;
 use naga::keywords::wgsl::{BUILTIN_IDENTIFIERS, RESERVED};
 
 /// Names that the generated modules declare themselves.
-const GENERATED: [&str; 16] = [
+const GENERATED: [&str; 18] = [
     "Hit",
     "Pass",
     "END",
@@ -23,6 +23,8 @@ const GENERATED: [&str; 16] = [
     "splat",
     "tally_counts",
     "tally_rates",
+    "tally_share",
+    "add_tallies",
 ];
 
 /// Built-in names that a declaration may hide: no stage can use the type, since all resources are buffers.

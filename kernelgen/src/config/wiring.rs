@@ -145,8 +145,8 @@ fn check_generated(pipeline: &Pipeline, findings: &mut Findings) {
 /// A function of the generated module `control`.
 const COUNT_RAY: &str = "count_ray";
 
-fn tally_functions(name: &str, tally: &Tally) -> [(String, Span); 2] {
-    [(format!("count_{name}"), tally.span), (format!("{name}_rate"), tally.span)]
+fn tally_functions(name: &str, tally: &Tally) -> [(String, Span); 3] {
+    [format!("count_{name}"), format!("{name}_rate"), format!("{name}_rate_sum")].map(|function| (function, tally.span))
 }
 
 /// Layout tables name instances.

@@ -357,7 +357,7 @@ impl Builder<'_> {
         let tallied = Size { fixed: 4 * tally::words(program.tallies), ..Size::default() };
         buffers.extend([
             buffer(tally::COUNTS, Role::TallyCounts, tallied),
-            buffer(tally::RATES, Role::TallyRates, tallied),
+            buffer(tally::RATES, Role::TallyRates, Size { fixed: 2 * tallied.fixed, ..tallied }),
         ]);
         buffers.extend([buffer("film", Role::Film, film), buffer("pass_info", Role::Pass, fixed(32))]);
         buffers

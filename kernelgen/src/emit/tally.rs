@@ -46,7 +46,7 @@ pub(super) fn module(pipeline: &Pipeline, tallies: &[Tally], workgroup: u32) -> 
         "import package::real::real;\n\n\
          /// Counts of the present samples, tally by tally.\n\
          var<storage, read_write> {COUNTS}: array<atomic<u32>>;\n\n\
-         /// Counts of earlier samples divided by the number of their paths.\n\
+         /// Counts of earlier samples divided by the number of their paths, then their sums: of each tally up to each index.\n\
          var<storage, read> {RATES}: array<f32>;\n"
     );
     let words = words(tallies);
@@ -69,12 +69,12 @@ pub(super) fn module(pipeline: &Pipeline, tallies: &[Tally], workgroup: u32) -> 
     }
     for tally in tallies {
         let doc = pipeline.tallies.get(&tally.name).map_or("", |declared| declared.doc.as_str());
-        push_functions(&mut text, tally, doc);
+        push_functions(&mut text, tally, doc, words);
     }
     text
 }
 
-fn push_functions(text: &mut String, tally: &Tally, doc: &str) {
+fn push_functions(text: &mut String, tally: &Tally, doc: &str, words: u64) {
     let Tally { name, first, size } = tally;
     let colon = if doc.is_empty() { "." } else { ": " };
     let doc = doc.replace('\n', " ");
@@ -88,6 +88,10 @@ fn push_functions(text: &mut String, tally: &Tally, doc: &str) {
          /// How often a path of the earlier samples counted at an index of `{name}`.\n\
          fn {name}_rate(index: u32) -> real {{\n    \
              return {RATES}[{word}];\n\
+         }}\n\n\
+         /// The sum of `{name}_rate` up to an index, that included.\n\
+         fn {name}_rate_sum(index: u32) -> real {{\n    \
+             return {RATES}[{words}u + {word}];\n\
          }}\n"
     );
 }

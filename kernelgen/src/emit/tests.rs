@@ -434,7 +434,7 @@ place = [
 /// The pipeline with tallies, and stages that count and read.
 fn with_tallies(declared: &str, used: &str) -> Result<Generated, Refusal> {
     let pipeline = format!("{PIPELINE}\n[tallies]\n{declared}\n");
-    let imports = "import package::tallies::{count_bounces, bounces_rate};\n";
+    let imports = "import package::tallies::{count_bounces, bounces_rate, bounces_rate_sum};\n";
     let stages = format!("{imports}{}", STAGES.replace("    eye.throughput *= 0.5;\n", used));
     crate::generate(&sources(&pipeline, LAYOUT, &stages), &selection(&[]))
 }
@@ -443,13 +443,13 @@ const TALLIES: &str = "other = { size = \"3\" }\nbounces = { size = \"max_edges 
 
 #[test]
 fn tallies_have_their_parts_of_two_buffers() {
-    let used = "    count_bounces(path.length);\n    eye.throughput *= bounces_rate(0u);\n";
+    let used = "    count_bounces(path.length);\n    eye.throughput *= bounces_rate(0u) + bounces_rate_sum(2u);\n";
     let plan = with_tallies(TALLIES, used).unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan;
     let parts: Vec<_> = plan.tallies.iter().map(|tally| (tally.name.as_str(), tally.first, tally.size)).collect();
     assert_eq!(parts, [("other", 0, 3), ("bounces", 3, 6)]);
     for (role, access) in [(Role::TallyCounts, Access::ReadWrite), (Role::TallyRates, Access::Read)] {
         let index = plan.buffers.iter().position(|buffer| buffer.role == role).unwrap();
-        assert_eq!(plan.buffers[index].size.fixed, 36);
+        assert_eq!(plan.buffers[index].size.fixed, if role == Role::TallyRates { 72 } else { 36 });
         let binding = kernel(&plan, "shade").bindings.iter().find(|binding| binding.buffer == index).unwrap();
         assert_eq!(binding.access, access);
         let elsewhere = plan.kernels.iter().filter(|kernel| kernel.name != "shade").flat_map(|kernel| &kernel.bindings);
@@ -457,6 +457,7 @@ fn tallies_have_their_parts_of_two_buffers() {
     }
     let shade = &kernel(&plan, "shade").module;
     assert!(shade.contains("/// Counts at an index of `bounces`: Bounces."), "{shade}");
+    assert!(shade.contains("return tally_rates[9u + 3u + min(index, 5u)];"), "{shade}");
     assert!(shade.contains("atomicAdd(&tally_share[3u + min(index, 5u)], 1u);"), "{shade}");
     // Whoever counts adds up for its workgroup, out of every branch; the others know nothing of it.
     assert!(

@@ -13,7 +13,7 @@ import package::transport::walk::begin_eye;
 fn start_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     path.eye_length = 0u;
     if counting == counting_realised {
-        for (var edges = 1u; edges <= eye_limit(path.light_length); edges += 1u) {
+        for (var edges = select(2u, 1u, path.light_length == 1u); edges <= eye_limit(path.light_length); edges += 1u) {
             count_implicit_walks(edges);
         }
     }

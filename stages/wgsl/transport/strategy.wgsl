@@ -4,7 +4,7 @@
 import package::real::real;
 import package::params::{counting, counting_first, counting_measured, early_end, max_edges};
 import package::params::{only_edges, only_eye_vertices, use_connection, use_explicit, use_implicit, use_particle};
-import package::tallies::light_vertices_rate;
+import package::tallies::light_vertices_rate_sum;
 
 /// Whether a strategy takes part. With `only_edges` the bits of `only_eye_vertices` say which s do.
 fn is_used(s: u32, t: u32) -> bool {
@@ -41,32 +41,36 @@ fn eye_limit(t: u32) -> u32 {
     if t == 1u {
         return max_edges;
     }
-    if early_end || counting == counting_first {
+    if early_end || counting == counting_first || t == max_edges {
         return max_edges - t;
     }
     return max_edges - t + 1u;
 }
 
-/// Whether light that the walk to x_s belonging to light vertex `t` meets counts.
+/// Whether light that the walk to x_s belonging to light vertex `t` meets counts. Light that the camera sees counts once a sample: it
+/// has no other strategy, and a random number of walks that see it would be nothing but noise.
 fn implicit_counts(s: u32, t: u32) -> bool {
-    return (counting != counting_first || t == 1u) && is_used(s, 0u);
+    return (t == 1u || (counting != counting_first && s > 1u)) && is_used(s, 0u);
 }
 
 /// Samples of the implicit strategy of `edges` edges for each light path: the eye walks that may reach so far. Measured: their
 /// expected number; realised: the largest possible, a constant that the picture is corrected for at the end.
 fn implicit_samples(edges: u32) -> real {
-    if counting == counting_first {
-        return 1.0;
-    }
     var samples = real(1.0);
-    for (var t = 2u; t <= max_edges && eye_limit(t) >= edges; t += 1u) {
+    if counting != counting_first && edges > 1u {
+        let last = last_eye_walk(edges);
+        samples = real(last);
         if counting == counting_measured {
-            samples += real(light_vertices_rate(t));
-        } else {
-            samples += 1.0;
+            // Light vertices are numbered from 1: nothing is counted at 0.
+            samples = light_vertices_rate_sum(last);
         }
     }
     return samples;
+}
+
+/// The last light vertex whose eye walk may have so many edges, two at least: see `eye_limit`.
+fn last_eye_walk(edges: u32) -> u32 {
+    return max(max_edges - edges + select(1u, 0u, early_end), 1u);
 }
 
 /// `implicit_samples`, or 0 where that strategy is left out.

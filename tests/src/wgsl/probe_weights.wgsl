@@ -250,7 +250,7 @@ fn count(row: u32, off: real) {
 
 /// Samples of the implicit strategy if light walks never end. Where they do, what `implicit_samples` says.
 fn samples_at_rate_one(edges: u32) -> real {
-    if counting == counting_first {
+    if counting == counting_first || edges == 1u {
         return 1.0;
     }
     if light_vertices_rate(2u) < 1.0 {

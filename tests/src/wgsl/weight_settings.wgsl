@@ -17,9 +17,18 @@ var<private> survival: real;
 /// Which subset of the strategies is on: 0 all, 1 by kind, 2 by the number of eye vertices.
 var<private> subset: u32;
 
-/// In place of what earlier samples counted.
+/// In place of what earlier samples counted: how many light walks reach vertex t.
 fn light_vertices_rate(t: u32) -> real {
     return power(survival, real(t - 1u));
+}
+
+/// Their sum up to vertex t.
+fn light_vertices_rate_sum(t: u32) -> real {
+    var sum = real(0.0);
+    for (var i = 1u; i <= t; i += 1u) {
+        sum += light_vertices_rate(i);
+    }
+    return sum;
 }
 
 /// Settings for a path of `edges` edges: of weights and counting, and of the subset.
