@@ -1,17 +1,16 @@
-//! Runs a plan: pipelines, the flattened program, passes in flight, counters. Knows no stage and no field by name.
+//! Runs a plan: pipelines, passes in flight. Knows no stage and no field by name.
 
 use crate::buffers::Buffers;
+use crate::counters::Counters;
 use crate::device::{Gpu, mapped};
 use crate::error::Error;
 use crate::profile::{Profile, Queries};
+use crate::program::{Command, Extent, commands};
 use bytemuck::{Pod, Zeroable};
-use kernelgen::plan::{Access, Kernel, Plan, Role, Step};
+use kernelgen::plan::{Access, Kernel, Plan, Role};
 use rayon::prelude::*;
-use serde::Serialize;
 use std::collections::VecDeque;
 
-/// Size of the pass uniform.
-pub const PASS_BYTES: u64 = 32;
 /// Widest dispatch in one dimension.
 const WIDEST: u32 = 65_535;
 /// Passes that may be queued on the device at once: one runs, the next is ready, one is being read.
@@ -35,69 +34,6 @@ pub struct Pass {
     pub seed: u32,
     /// Padding.
     pub unused: [u32; 2],
-}
-
-/// What the kernels counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Counters {
-    /// Camera rays.
-    pub primary: u64,
-    /// Rays after the first scattering.
-    pub secondary: u64,
-    /// Later rays of walks.
-    pub deep: u64,
-    /// Shadow and connection rays.
-    pub visibility: u64,
-    /// Contributions refused by the film: not finite, or negative.
-    pub rejected: u64,
-    /// Records that found no room in a stream or queue.
-    pub overflow: u64,
-    /// Paths alive after the last round.
-    pub unfinished: u64,
-}
-
-impl Counters {
-    fn slot(&mut self, name: &str) -> Option<&mut u64> {
-        Some(match name {
-            "rays_primary" => &mut self.primary,
-            "rays_secondary" => &mut self.secondary,
-            "rays_deep" => &mut self.deep,
-            "rays_visibility" => &mut self.visibility,
-            "rejected" => &mut self.rejected,
-            "overflow" => &mut self.overflow,
-            "unfinished" => &mut self.unfinished,
-            _ => return None,
-        })
-    }
-
-    /// Adds another pass.
-    pub fn add(&mut self, other: &Counters) {
-        self.primary += other.primary;
-        self.secondary += other.secondary;
-        self.deep += other.deep;
-        self.visibility += other.visibility;
-        self.rejected += other.rejected;
-        self.overflow += other.overflow;
-        self.unfinished += other.unfinished;
-    }
-}
-
-/// How large a dispatch is.
-#[derive(Clone, Copy, Debug)]
-enum Extent {
-    Active,
-    Single,
-    Indirect(u64),
-}
-
-/// A dispatch of the flattened program.
-#[derive(Clone, Copy, Debug)]
-pub struct Command {
-    /// Index into `Plan::kernels`.
-    pub kernel: usize,
-    /// Round of the outermost loop; 0 outside.
-    pub round: u32,
-    extent: Extent,
 }
 
 #[derive(Debug)]
@@ -145,8 +81,6 @@ impl Executor {
             .par_iter()
             .map(|kernel| pipeline(gpu, plan, kernel, buffers))
             .collect::<Result<Vec<_>, Error>>()?;
-        let mut program = Vec::new();
-        flatten(&plan.program, None, &mut program);
         let arguments = plan.buffers.iter().position(|buffer| buffer.role == Role::Arguments);
         let counters: Vec<_> = plan.counters.iter().map(|counter| (counter.name.clone(), counter.word)).collect();
         let words = counters.iter().map(|(_, word)| u64::from(*word));
@@ -158,7 +92,7 @@ impl Executor {
             queries: None,
             warm: false,
             profile: Profile::new(plan),
-            program,
+            program: commands(&plan.program),
             arguments: arguments.and_then(|index| buffers.all[index].clone()),
             pass: buffers.of(plan, Role::Pass)?.clone(),
             control: buffers.of(plan, Role::Control)?.clone(),
@@ -274,7 +208,7 @@ impl Executor {
             let times = queries.read(&self.gpu)?;
             self.profile.add(&self.program, &times, &counters, flight.first);
         }
-        refuse_losses(&counters)?;
+        counters.refuse_losses()?;
         Ok(counters)
     }
 
@@ -288,38 +222,6 @@ impl Executor {
             }
         }
         counters
-    }
-}
-
-fn refuse_losses(counters: &Counters) -> Result<(), Error> {
-    if counters.overflow > 0 {
-        let lost = counters.overflow;
-        return Err(Error::failed(format!(
-            "a stream overflowed: {lost} records were lost in one pass, so the picture would be wrong"
-        )));
-    }
-    if counters.unfinished > 0 {
-        let left = counters.unfinished;
-        return Err(Error::failed(format!(
-            "{left} paths were still alive after the last round: the pipeline's `rounds` is too small"
-        )));
-    }
-    Ok(())
-}
-
-fn flatten(steps: &[Step], round: Option<u32>, program: &mut Vec<Command>) {
-    for step in steps {
-        let command = |kernel: usize, extent| Command { kernel, round: round.unwrap_or(0), extent };
-        match step {
-            Step::Dispatch { kernel } => program.push(command(*kernel, Extent::Active)),
-            Step::Single { kernel } => program.push(command(*kernel, Extent::Single)),
-            Step::Indirect { kernel, slot } => program.push(command(*kernel, Extent::Indirect(u64::from(*slot) * 12))),
-            Step::Loop { rounds, body } => {
-                for index in 0..*rounds {
-                    flatten(body, round.or(Some(index)), program);
-                }
-            }
-        }
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod buffers;
 pub mod compare;
 pub mod configs;
+pub mod counters;
 pub mod device;
 pub mod error;
 pub mod execute;
@@ -12,6 +13,7 @@ pub mod measurements;
 pub mod output;
 pub mod picture;
 pub mod profile;
+pub mod program;
 pub mod pyramid;
 pub mod render;
 pub mod scene;

@@ -1,7 +1,7 @@
 //! What a render measured, as `render --json` and studies write it.
 
+use crate::counters::Counters;
 use crate::device::Gpu;
-use crate::execute::Counters;
 use crate::profile::ByKind;
 use crate::render::Rendered;
 use crate::settings::RenderFile;

@@ -1,8 +1,9 @@
 //! Device times of kernels by timestamp queries, and ray rates from them.
 
+use crate::counters::Counters;
 use crate::device::{Gpu, mapped};
 use crate::error::Error;
-use crate::execute::{Command, Counters};
+use crate::program::Command;
 use indexmap::IndexMap;
 use kernelgen::config::model::RayKind;
 use kernelgen::plan::Plan;

@@ -1,9 +1,10 @@
 //! A render from plan to picture: splits pixels x samples into passes and batches, keeps passes in flight, adds up what they count.
 
 use crate::buffers::{Buffers, Resources, choose_path_count, usable_slots};
+use crate::counters::Counters;
 use crate::device::Gpu;
 use crate::error::Error;
-use crate::execute::{Counters, Executor, IN_FLIGHT, Pass};
+use crate::execute::{Executor, IN_FLIGHT, Pass};
 use crate::film::{Accumulator, Totals, shares};
 use crate::profile::Profile;
 use crate::tallies::{PILOT_SEED, PILOT_SLOTS, Tallies};

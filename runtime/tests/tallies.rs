@@ -4,7 +4,7 @@ mod common;
 
 use common::{SIZE, Small, gpu, rendered, session};
 use kernelgen::plan::Plan;
-use runtime::execute::Counters;
+use runtime::counters::Counters;
 use runtime::film::Totals;
 use runtime::render::Until;
 use runtime::tallies::PILOT_SLOTS;

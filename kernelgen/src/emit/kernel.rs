@@ -1,8 +1,8 @@
 //! Kernels of stages and of stream consumers, as text.
 
 use super::memory::Access;
-use super::queue::{Queues, stage_constant, stream_constant};
-use super::text::Imports;
+use super::queue::Queues;
+use super::text::{Imports, PARAMETERS, stage_constant, stream_constant};
 use super::wiring::{WiredStage, WiredStream};
 use indexmap::IndexMap;
 use std::collections::BTreeSet;
@@ -16,12 +16,6 @@ pub(super) enum Source {
     /// The queue of the stage.
     Queue,
 }
-
-/// What every kernel over paths or records is told of its place.
-pub(super) const PARAMETERS: &str = "(\n    \
-    @builtin(workgroup_id) group: vec3u,\n    \
-    @builtin(num_workgroups) groups: vec3u,\n    \
-    @builtin(local_invocation_index) lane: u32,\n)";
 
 /// The kernel of a stage: load, call, store, enqueue.
 pub(super) fn stage_kernel(

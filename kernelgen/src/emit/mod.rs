@@ -2,6 +2,7 @@
 
 mod entry;
 mod film;
+mod housekeeping;
 mod kernel;
 mod memory;
 mod modules;

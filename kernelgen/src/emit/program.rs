@@ -1,8 +1,9 @@
 //! From kernel texts to the plan: linking, validation, buffers, the order of steps.
 
+use super::housekeeping::{self, Entries, Prepared};
 use super::kernel::{self, Source};
 use super::memory::{self, Access};
-use super::queue::{self, Entries, Prepared, Queues};
+use super::queue::{self, Queues};
 use super::room;
 use super::stream;
 use super::tally;
@@ -78,13 +79,13 @@ impl Builder<'_> {
         let program = self.program;
         let start = program.variant.pipeline.start.value.as_str();
         let start_rays = program.wiring.stages.get(start).and_then(|stage| stage.rays);
-        let begin = self.housekeeping("begin", queue::begin_kernel(start_rays), 64);
+        let begin = self.housekeeping("begin", housekeeping::begin_kernel(start_rays), 64);
         let first = self.stage(start, Source::Slots);
         let consumers = self.consumers();
         let body = self.round(&consumers);
         let left: Vec<Prepared> =
             consumers.keys().map(|stream| self.prepared_stream(stream, Entries::Stream(stream.clone()))).collect();
-        let finish = self.housekeeping("finish", queue::finish_kernel(program.queues, &left), 1);
+        let finish = self.housekeeping("finish", housekeeping::finish_kernel(program.queues, &left), 1);
         let mut steps = vec![
             Step::Single { kernel: begin },
             Step::Dispatch { kernel: first },
@@ -174,7 +175,7 @@ impl Builder<'_> {
 
     /// Adds a prepare kernel; the first of a round counts the round.
     fn prepare(&mut self, name: &str, prepared: &[Prepared], body: &mut Vec<Step>) {
-        let text = queue::prepare_kernel(name, body.is_empty(), prepared);
+        let text = housekeeping::prepare_kernel(name, body.is_empty(), prepared);
         let kernel = self.housekeeping(name, text, 1);
         body.push(Step::Single { kernel });
     }
@@ -183,7 +184,7 @@ impl Builder<'_> {
     fn order(&mut self, stage: &str) -> Step {
         let name = format!("order_{stage}");
         let workgroup = self.program.queues.workgroup;
-        let kernel = self.housekeeping(&name, queue::order_kernel(&name, stage, workgroup), workgroup);
+        let kernel = self.housekeeping(&name, housekeeping::order_kernel(&name, stage, workgroup), workgroup);
         Step::Dispatch { kernel }
     }
 

@@ -1,8 +1,7 @@
 //! `package::streams`: what happens to a record that a stage pushes.
 
-use super::queue::stream_constant;
 use super::room;
-use super::text::{COMPONENTS, Imports};
+use super::text::{COMPONENTS, Imports, stream_constant};
 use super::wiring::{WiredStream, Wiring};
 use crate::config::model::{Pipeline, RayKind};
 use crate::config::quantity::LeafType;

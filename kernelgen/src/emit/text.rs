@@ -31,3 +31,19 @@ impl fmt::Display for Imports {
 
 /// The components of a vector, by index.
 pub(super) const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
+
+/// What every kernel over paths or records is told of its place.
+pub(super) const PARAMETERS: &str = "(\n    \
+    @builtin(workgroup_id) group: vec3u,\n    \
+    @builtin(num_workgroups) groups: vec3u,\n    \
+    @builtin(local_invocation_index) lane: u32,\n)";
+
+/// The WGSL constant of a stage's queue.
+pub(super) fn stage_constant(stage: &str) -> String {
+    format!("QUEUE_{}", stage.to_uppercase())
+}
+
+/// The WGSL constant of a stream's queue.
+pub(super) fn stream_constant(stream: &str) -> String {
+    format!("STREAM_{}", stream.to_uppercase())
+}

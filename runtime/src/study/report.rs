@@ -2,8 +2,7 @@
 
 use super::chart::{Chart, Scale, escape, shown};
 use super::file::{Study, Wanted};
-use super::results::{Errors, Reference, Results, Run};
-use super::run::difference_path;
+use super::results::{Errors, Reference, Results, Run, difference_path};
 use crate::compare::Image;
 use crate::error::Error;
 use crate::picture::{Exposure, png, to_srgb};

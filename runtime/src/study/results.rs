@@ -8,7 +8,7 @@ use crate::image_file::replace;
 use crate::measurements::Measurements;
 use crate::settings::SetValue;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Side of the blocks whose means are compared, pixels.
 const BLOCK: u32 = 8;
@@ -246,6 +246,11 @@ fn error(run: &Run, value: fn(&Errors) -> Option<f64>) -> String {
 
 fn quoted(cell: &str) -> String {
     if cell.contains([',', '"', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
+}
+
+/// Where the picture of the difference from the reference lies beside a picture.
+pub fn difference_path(picture: &Path) -> PathBuf {
+    picture.with_extension("difference.png")
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::file::{Against, Study, StudyScene, Variant, Wanted, file_name};
 use super::report;
-use super::results::{Errors, Reference, Results, Run, Skipped, write_text};
+use super::results::{Errors, Reference, Results, Run, Skipped, difference_path, write_text};
 use crate::compare::metrics::difference_picture;
 use crate::configs::Library;
 use crate::device::Gpu;
@@ -17,7 +17,7 @@ use crate::scene::{Accelerator, Scene};
 use crate::settings::RenderFile;
 use kernelgen::Generated;
 use kernelgen::config::model::Effects;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The folder of pictures in that of the study.
 const PICTURES: &str = "pictures";
@@ -360,11 +360,6 @@ fn tasks_of<'a>(
 fn picture_name(scene: &str, variant: &str, repeat: u32) -> String {
     let turn = if repeat > 0 { format!("--{repeat}") } else { String::new() };
     format!("{PICTURES}/{}--{}{turn}.exr", file_name(scene), file_name(variant))
-}
-
-/// Where the picture of the difference from the reference lies.
-pub fn difference_path(picture: &Path) -> PathBuf {
-    picture.with_extension("difference.png")
 }
 
 /// The keys that decide what is loaded.
