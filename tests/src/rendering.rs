@@ -1,4 +1,4 @@
-//! Renders scenes for tests, one at a time, on the best adapter of the machine: Mesa's software driver in CI.
+//! Renders scenes for tests, two at a time, on the best adapter of the machine: Mesa's software driver in CI.
 
 use crate::scene_builder::SceneBuilder;
 use crate::sky::Sky;
@@ -15,16 +15,32 @@ use runtime::settings::{RenderFile, SetValue};
 use runtime::tallies::Tallied;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// Batches that a render is cut into, so that its standard errors are good to a tenth.
 const BATCHES: u32 = 64;
 
-/// The device of all tests of a program. Renders take turns: they use all cores of a software device anyway.
-static GPU: LazyLock<Mutex<Gpu>> = LazyLock::new(|| {
-    Mutex::new(Gpu::open(&DeviceOptions::default()).expect("there is a Vulkan device, if only Mesa's software driver"))
+/// The devices of all tests of a program. Renders take turns on each: a software device renders with all cores, but compiles with one.
+static DEVICES: LazyLock<[Mutex<Gpu>; 2]> = LazyLock::new(|| {
+    let open =
+        || Gpu::open(&DeviceOptions::default()).expect("there is a Vulkan device, if only Mesa's software driver");
+    [Mutex::new(open()), Mutex::new(open())]
 });
+
+/// A device, free or the next in turn. A test that failed while it rendered leaves it as it was: every render makes its own buffers.
+fn device() -> MutexGuard<'static, Gpu> {
+    static NEXT: AtomicUsize = AtomicUsize::new(0);
+    for device in DEVICES.iter() {
+        match device.try_lock() {
+            Ok(device) => return device,
+            Err(TryLockError::Poisoned(failed)) => return failed.into_inner(),
+            Err(TryLockError::WouldBlock) => {}
+        }
+    }
+    let turn = NEXT.fetch_add(1, Ordering::Relaxed) % DEVICES.len();
+    DEVICES[turn].lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// What to render and how. Every setter returns the job.
 #[derive(Clone, Debug)]
@@ -167,8 +183,7 @@ impl Job {
         if plan.buffers.iter().any(|buffer| buffer.name == "bvh2_nodes") {
             scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
         }
-        // A test that failed while it rendered leaves the device as it was: every render makes its own buffers.
-        let gpu = GPU.lock().unwrap_or_else(PoisonError::into_inner);
+        let gpu = device();
         let settings = Settings { size: self.size, seed: self.seed, paths: None };
         let resources = |name: &str| scene.resource(name);
         let mut session =
