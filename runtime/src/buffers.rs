@@ -11,8 +11,6 @@ const DEFAULT_PATHS_GPU: u64 = 1 << 22;
 const DEFAULT_PATHS_CPU: u64 = 1 << 17;
 /// The most that may be asked for: 32-bit ray counters must survive a pass of a thousand rounds.
 const MOST_PATHS: u64 = 1 << 22;
-/// Size of the pass uniform at least, bytes: that of `execute::Pass`.
-const PASS_BYTES: u64 = 32;
 /// Slots come in multiples of this.
 const GRAIN: u64 = SLOT_GRAIN as u64;
 
@@ -123,7 +121,6 @@ fn allocate(gpu: &Gpu, buffer: &Buffer, size: u64) -> Result<wgpu::Buffer, Error
         Role::TallyRates => BufferUsages::STORAGE | BufferUsages::COPY_DST,
         Role::State | Role::Queue | Role::Stream | Role::Resource => BufferUsages::STORAGE,
     };
-    let size = if buffer.role == Role::Pass { size.max(PASS_BYTES) } else { size };
     create(gpu, &buffer.name, size, usage)
 }
 

@@ -2,8 +2,8 @@
 
 use crate::material::Material;
 use crate::rendering::{BuiltScene, Job, Rendering};
-use crate::scene_builder::{Camera, SceneBuilder};
-use crate::shape::sphere;
+use crate::scene_builder::{Camera, MaterialId, SceneBuilder};
+use crate::shape::{disk, sphere};
 use crate::sky::Sky;
 use crate::statistics::{Estimate, spread};
 use glam::{DVec2, DVec3, dvec3};
@@ -74,6 +74,19 @@ pub fn glass_over_a_floor(floor: Material, height: f64, camera: Camera) -> Scene
     scene.floor(floor, height, WIDE);
     scene.camera("main", camera);
     scene
+}
+
+/// A sky of radiance 1, seen straight up from 1 m inside glass.
+pub fn sky_from_inside_glass() -> BuiltScene {
+    let camera = narrow(dvec3(0.0, -1.0, 0.0), DVec3::ZERO);
+    let scene = glass_over_a_floor(Material::lambert("black", [0.0; 3]), -2.0, camera);
+    BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])))
+}
+
+/// An emitter of radiance 1 inside glass, seen straight down from outside.
+pub fn emitter_inside_glass() -> BuiltScene {
+    let scene = glass_over_a_floor(Material::emitter("light", [1.0; 3]), -1.0, narrow(DVec3::Y, DVec3::ZERO));
+    BuiltScene::new(&scene, None)
 }
 
 /// A sky of radiance 1 above the horizon. The row of texels that is blurred into the black below it brings 1e-4 of the light.
@@ -219,9 +232,60 @@ pub fn lambert_under_point(albedo: f64, height: f64, place: DVec2) -> f64 {
     albedo / PI * height / (height * height + place.length_squared()).powf(1.5)
 }
 
+/// A light of radiance 1 over a floor.
+#[derive(Clone, Copy)]
+pub struct FloorLight {
+    /// Adds it, of this material, to a scene.
+    pub add: fn(&mut SceneBuilder, MaterialId),
+    /// Its form factor from a place on the floor.
+    factor: fn(DVec2) -> f64,
+}
+
+/// A parallel unit square at unit height.
+pub const SQUARE_LIGHT: FloorLight =
+    FloorLight { add: |scene, light| scene.ceiling(light, 1.0, 1.0), factor: factor_of_unit_square };
+/// A parallel disk of radius 1 at unit height: E = pi Le a^2/(a^2+h^2) below its centre.
+pub const DISK_LIGHT: FloorLight = FloorLight {
+    add: |scene, light| scene.mesh(light, disk(DVec3::Y, DVec3::NEG_Y, 1.0, 128)),
+    factor: factor_of_unit_disk,
+};
+/// A sphere of radius .5 at height 2: E = pi Le (R/D)^2 cos.
+pub const SPHERE_LIGHT: FloorLight = FloorLight { add: add_sphere, factor: factor_of_sphere };
+
+impl FloorLight {
+    /// The light over a floor of albedo .5 that is seen from below the light.
+    pub fn over_a_floor(self) -> BuiltScene {
+        let mut scene = FROM_BELOW_THE_LIGHT.floor(0.5, 20.0);
+        let light = scene.material(Material::emitter("light", [1.0; 3]));
+        (self.add)(&mut scene, light);
+        BuiltScene::new(&scene, None)
+    }
+
+    /// Every pixel of that floor is as expected.
+    ///
+    /// # Panics
+    /// When one is not.
+    #[track_caller]
+    pub fn assert_pixels(self, rendering: &Rendering, what: &str) {
+        FROM_BELOW_THE_LIGHT.assert_pixels(rendering, |place| 0.5 * (self.factor)(place), what);
+    }
+}
+
+/// Of facets, with the area of the ball as it is seen from below.
+fn add_sphere(scene: &mut SceneBuilder, light: MaterialId) {
+    const RINGS: u32 = 48;
+    let slice = PI / f64::from(RINGS);
+    scene.mesh(light, sphere(DVec3::Y * 2.0, 0.5 * (slice / slice.sin()).sqrt(), RINGS));
+}
+
+fn factor_of_sphere(place: DVec2) -> f64 {
+    let distance = place.length().hypot(2.0);
+    (0.5 / distance).powi(2) * 2.0 / distance
+}
+
 /// Form factor from a place on the floor to a parallel unit square at unit height above the origin: four rectangles with a corner
 /// above the place.
-pub fn factor_of_unit_square(place: DVec2) -> f64 {
+fn factor_of_unit_square(place: DVec2) -> f64 {
     let corner = |a: f64, b: f64| {
         let (root_a, root_b) = (a.hypot(1.0), b.hypot(1.0));
         (a / root_a * (b / root_a).atan() + b / root_b * (a / root_b).atan()) / TAU
@@ -231,7 +295,7 @@ pub fn factor_of_unit_square(place: DVec2) -> f64 {
 }
 
 /// Form factor to a parallel disk of radius 1 at unit height above the origin.
-pub fn factor_of_unit_disk(place: DVec2) -> f64 {
+fn factor_of_unit_disk(place: DVec2) -> f64 {
     let d2 = place.length_squared();
     (1.0 - d2 / ((d2 + 2.0).powi(2) - 4.0 * d2).sqrt()) / 2.0
 }

@@ -1,5 +1,6 @@
 //! What the whole-system tests share: scenes built in memory, skies, and statistics; and the scenes that the repository ships.
 
+pub mod agreement;
 pub mod closed_form;
 pub mod compared;
 pub mod glb;

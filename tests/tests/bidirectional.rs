@@ -1,34 +1,21 @@
-//! Bidirectional path tracing: known answers in all and for every strategy alone, and the images of the pipelines that join no walks.
-//! The numbers are those of algorithm.md section 9.
+//! Bidirectional path tracing: known answers, by all strategies together and by every strategy alone. The numbers are those of algorithm.md section 9.
 
-use glam::{DVec2, DVec3, dvec3};
+use glam::{DVec3, dvec3};
 use std::f64::consts::PI;
 use std::sync::LazyLock;
-use tests::closed_form::{FROM_ABOVE, FROM_BELOW_THE_LIGHT, assert_mean, ball_in_a_constant_sky};
-use tests::closed_form::{factor_of_unit_disk, factor_of_unit_square, floor_below_glass, furnace as furnace_room};
-use tests::closed_form::{glass_over_a_floor, grey, lambert_under_point, narrow, sky_above};
-use tests::compared::{ball_beside_a_wall, beside_a_caustic, lamps, leaning_mirror, sun_and_sky};
+use tests::agreement::{BLOCK, assert_differ, assert_same};
+use tests::closed_form::{DISK_LIGHT, FROM_ABOVE, FROM_BELOW_THE_LIGHT, FloorLight, SPHERE_LIGHT, SQUARE_LIGHT};
+use tests::closed_form::{assert_mean, ball_in_a_constant_sky, emitter_inside_glass, floor_below_glass};
+use tests::closed_form::{furnace as furnace_room, grey, lambert_under_point, sky_above, sky_from_inside_glass};
 use tests::material::Material;
-use tests::rendering::{BuiltScene, Job, Rendering, shipped};
-use tests::scene_builder::{Camera, MaterialId, SceneBuilder};
-use tests::shape::{Mesh, disk, sphere, turned_cuboid};
+use tests::rendering::{BuiltScene, Job, Rendering};
+use tests::scene_builder::{Camera, SceneBuilder};
+use tests::shape::{Mesh, sphere};
 use tests::sky::Sky;
-use tests::statistics::{Estimate, Pixels, Spread, spread, z_scores};
-
-/// Pixels along an edge of a block whose mean is compared.
-const BLOCK: usize = 8;
-/// f32 sums of radiance, as a share of the value.
-const ROUNDING: f64 = 3e-4;
+use tests::statistics::{Estimate, Pixels};
 
 fn sbdpt(job: &Job, edges: u32, samples: u32) -> Job {
     job.clone().pipeline("sbdpt").edges(edges).samples(samples)
-}
-
-/// Paths of so many edges by the strategy with `eye_vertices` vertices from the camera, counted in full. At the greatest length all
-/// counts of implicit samples are one.
-fn alone(job: &Job, edges: u32, eye_vertices: u32, samples: u32) -> Job {
-    let job = sbdpt(job, edges, samples).set("mis", "none").set("counting", "first");
-    job.set("only_edges", edges).set("only_eye_vertices", 1u32 << eye_vertices)
 }
 
 /// Light vertices joined to the camera, and nothing else.
@@ -36,40 +23,11 @@ fn particles(job: Job) -> Job {
     job.set("use_implicit", false).set("use_explicit", false).set("use_connection", false)
 }
 
-/// Two renderings show the same image.
-#[track_caller]
-fn assert_agree(a: &Rendering, b: &Rendering, what: &str) {
-    assert_eq!((a.rejected, b.rejected), (0, 0), "{what}: rejected contributions");
-    assert_same(&a.pixels, &b.pixels, BLOCK, 0.01, what);
-}
-
-/// Block means and the mean of two images agree; the standard errors of the latter, as a share, are below `noise`. The channels of a
-/// block are no independent tests where light or surfaces are grey: the worst counts.
-#[track_caller]
-fn assert_same(a: &Pixels, b: &Pixels, block: usize, noise: f64, what: &str) {
-    let means = [a, b].map(Pixels::mean_estimate);
-    for mean in means {
-        assert!(mean.error <= noise * mean.mean, "{what}: {mean:?} is too noisy to test anything");
-    }
-    let blocks = worst_of_blocks(a, b, block);
-    assert!(blocks.agrees(), "{what}: blocks {blocks:?}");
-    let z = means[0].z(&means[1], ROUNDING * means[1].mean);
-    assert!(z.abs() < 4.0, "{what}: {:?} against {:?}", means[0], means[1]);
-}
-
-/// z-scores of blocks, of each that of its worst channel.
-fn worst_of_blocks(a: &Pixels, b: &Pixels, block: usize) -> Spread {
-    let scores = z_scores(&a.block_estimates(block), &b.block_estimates(block), ROUNDING);
-    let worst = |channels: &[f64]| channels.iter().fold(0.0, |worst: f64, score| worst.max(score.abs()));
-    spread(&scores.chunks_exact(3).map(worst).collect::<Vec<f64>>())
-}
-
-/// Two renderings differ in the mean by far more than noise, and by a twentieth at least.
-#[track_caller]
-fn assert_differ(a: &Rendering, b: &Rendering, what: &str) {
-    let (a, b) = (a.pixels.mean_estimate(), b.pixels.mean_estimate());
-    let apart = (a.mean - b.mean).abs();
-    assert!(a.z(&b, 0.0).abs() > 10.0 && apart > 0.05 * b.mean, "{what}: {a:?} against {b:?}");
+/// Paths of so many edges by the strategy with `eye_vertices` vertices from the camera, counted in full. At the greatest length all
+/// counts of implicit samples are one.
+fn alone(job: &Job, edges: u32, eye_vertices: u32, samples: u32) -> Job {
+    let job = sbdpt(job, edges, samples).set("mis", "none").set("counting", "first");
+    job.set("only_edges", edges).set("only_eye_vertices", 1u32 << eye_vertices)
 }
 
 /// Check 1: walls that emit 1 and reflect .8 give the sum of .8^i below the number of edges, whatever the weights.
@@ -195,39 +153,25 @@ fn point_light_over_a_plane() {
 /// Check 5: the form factor of a parallel unit square at unit height.
 #[test]
 fn square_light_over_a_plane() {
-    assert_seen_from_below(|scene, light| scene.ceiling(light, 1.0, 1.0), factor_of_unit_square);
+    assert_lit_by(SQUARE_LIGHT);
 }
 
-/// Check 6: the form factor of a parallel disk, E = pi Le a^2/(a^2+h^2) below its centre.
+/// Check 6: the form factor of a parallel disk.
 #[test]
 fn disk_light_over_a_plane() {
-    let add = |scene: &mut SceneBuilder, light| scene.mesh(light, disk(DVec3::Y, DVec3::NEG_Y, 1.0, 128));
-    assert_seen_from_below(add, factor_of_unit_disk);
+    assert_lit_by(DISK_LIGHT);
 }
 
-/// Check 6: E = pi Le (R/D)^2 cos below a sphere: R = .5, D = 2.
+/// Check 6: the form factor of a sphere.
 #[test]
 fn sphere_light_over_a_plane() {
-    const RINGS: u32 = 48;
-    let slice = PI / f64::from(RINGS);
-    let same_area_seen_from_below = 0.5 * (slice / slice.sin()).sqrt();
-    let add =
-        |scene: &mut SceneBuilder, light| scene.mesh(light, sphere(DVec3::Y * 2.0, same_area_seen_from_below, RINGS));
-    assert_seen_from_below(add, |place| {
-        let distance = place.length().hypot(2.0);
-        (0.5 / distance).powi(2) * 2.0 / distance
-    });
+    assert_lit_by(SPHERE_LIGHT);
 }
 
-/// Every pixel of a floor under a light of radiance 1, from below the light.
 #[track_caller]
-fn assert_seen_from_below(add: impl Fn(&mut SceneBuilder, MaterialId), factor: impl Fn(DVec2) -> f64) {
-    let mut scene = FROM_BELOW_THE_LIGHT.floor(0.5, 20.0);
-    let light = scene.material(Material::emitter("light", [1.0; 3]));
-    add(&mut scene, light);
-    let scene = BuiltScene::new(&scene, None);
-    let rendering = FROM_BELOW_THE_LIGHT.job(&scene, "sbdpt").samples(512).render();
-    FROM_BELOW_THE_LIGHT.assert_pixels(&rendering, |place| 0.5 * factor(place), "sbdpt");
+fn assert_lit_by(light: FloorLight) {
+    let scene = light.over_a_floor();
+    light.assert_pixels(&FROM_BELOW_THE_LIGHT.job(&scene, "sbdpt").samples(512).render(), "sbdpt");
 }
 
 /// Check 7: L = rho/pi E cos for a directional light.
@@ -328,92 +272,6 @@ fn difference(a: &Pixels, b: &Pixels) -> Pixels {
     Pixels { rgb: join(&a.rgb, &b.rgb, |a, b| a - b), errors: join(&a.errors, &b.errors, f32::hypot), ..*a }
 }
 
-/// Weights and counts of implicit samples.
-type Weights = (&'static str, &'static str);
-
-const BALANCE: Weights = ("balance", "measured");
-const FIRST: Weights = ("balance", "first");
-const POWER: Weights = ("power", "first");
-const AVERAGE: Weights = ("average", "realised");
-
-/// Renders by `sbdpt` with all these weights, by `pt` and, where it takes samples, by `lt`: the same image.
-#[track_caller]
-fn assert_pipelines_agree(job: &Job, weights: &[Weights], [ours, pt, lt]: [u32; 3]) {
-    let expected = job.clone().pipeline("pt").samples(pt).render();
-    for (mis, counting) in weights {
-        let job = job.clone().pipeline("sbdpt").set("mis", mis).set("counting", counting);
-        assert_agree(&job.samples(ours).render(), &expected, &format!("sbdpt ({mis}, {counting}) and pt"));
-    }
-    if lt > 0 {
-        assert_agree(&job.clone().pipeline("lt").samples(lt).render(), &expected, "lt and pt");
-    }
-}
-
-/// Check 10: an open scene in the light of a sun and of a sky.
-#[test]
-fn sbdpt_agrees_under_sun_and_sky() {
-    assert_pipelines_agree(&sun_and_sky().job().size(32, 32).edges(4), &[BALANCE, AVERAGE], [32, 64, 0]);
-}
-
-/// Check 10: one light of each kind.
-#[test]
-fn sbdpt_agrees_on_one_light_of_each_kind() {
-    let job = Job::of_file(shipped("light_kinds")).size(64, 40).edges(3);
-    assert_pipelines_agree(&job, &[BALANCE], [32, 96, 192]);
-}
-
-/// Check 10: a panel that emits from both sides and is in the picture, a point light and a spot light; through a lens.
-#[test]
-fn sbdpt_agrees_on_lamps_seen_through_a_lens() {
-    assert_pipelines_agree(&lamps().job().size(40, 40).edges(4).lens(0.1, 3.0), &[FIRST], [32, 64, 128]);
-}
-
-/// Check 10: lights without extent alone.
-#[test]
-fn sbdpt_agrees_on_delta_lights() {
-    let mut scene = SceneBuilder::new();
-    let floor = scene.material(Material::lambert("floor", [0.6, 0.5, 0.4]));
-    let ball = scene.material(Material::glossy("ball", [0.5, 0.6, 0.7], 0.6));
-    scene.floor(floor, 0.0, 4.0);
-    scene.quad(floor, dvec3(-2.0, 0.0, -1.5), DVec3::X * 4.0, DVec3::Y * 2.0);
-    scene.mesh(ball, sphere(dvec3(0.3, 0.5, 0.0), 0.5, 12));
-    scene.point_light(dvec3(-0.8, 1.2, 0.4), [0.5, 1.0, 0.2]);
-    scene.spot_light(dvec3(1.2, 2.0, 0.8), dvec3(-0.5, -1.0, -0.4), [3.0, 2.0, 6.0], 0.3, 0.5);
-    scene.directional_light(dvec3(0.5, -1.0, -0.6), [0.7, 0.5, 0.4]);
-    scene.camera("main", Camera { eye: dvec3(0.0, 1.3, 4.0), target: dvec3(0.0, 0.6, 0.0), yfov: 36.0, aspect: 1.0 });
-    let scene = BuiltScene::new(&scene, None);
-    assert_pipelines_agree(&scene.job().size(56, 56).edges(4), &[FIRST], [32, 64, 128]);
-}
-
-/// Check 10: caustics of smooth glass.
-#[test]
-fn sbdpt_agrees_on_a_caustic_of_glass() {
-    let scene = beside_a_caustic(Material::glass("glass", 1.5, 0.0), sphere(dvec3(0.0, 0.6, 0.0), 0.4, 16).flat());
-    assert_pipelines_agree(&scene.job().size(64, 32).edges(5), &[BALANCE], [64, 256, 0]);
-}
-
-/// Check 10: caustics of a mirror whose normals lean.
-#[test]
-fn sbdpt_agrees_on_a_caustic_of_a_mirror() {
-    let scene = beside_a_caustic(Material::metal("mirror", [0.9, 0.8, 0.7], 0.0), leaning_mirror());
-    assert_pipelines_agree(&scene.job().size(64, 32).edges(4), &[POWER], [64, 256, 0]);
-}
-
-/// Check 10: rough glass that absorbs, with smooth normals.
-#[test]
-fn sbdpt_agrees_on_rough_glass() {
-    let bottle = Some(([0.4, 0.7, 0.9], 0.5));
-    let scene = ball_beside_a_wall(Material { attenuation: bottle, ..Material::glass("glass", 1.5, 0.5) }, 8);
-    assert_pipelines_agree(&scene.job().size(72, 72).edges(4), &[FIRST], [32, 64, 0]);
-}
-
-/// Check 10: rough metal.
-#[test]
-fn sbdpt_agrees_on_rough_metal() {
-    let scene = ball_beside_a_wall(Material::metal("metal", [0.9, 0.7, 0.4], 0.4), 8);
-    assert_pipelines_agree(&scene.job().size(56, 56).edges(4), &[FIRST], [32, 64, 0]);
-}
-
 /// Check 12, the toy: a floor, a wall and a small bright panel, seen by a camera of 1.5 by 1 at unit distance.
 fn toy(sky: Option<&Sky>) -> BuiltScene {
     let mut scene = SceneBuilder::new();
@@ -471,18 +329,15 @@ fn toy_under_a_sky() {
 /// Check 15: out of glass at normal incidence radiance grows by eta^2 and loses 4 %: 2.25 x .96 = 2.16.
 #[test]
 fn radiance_of_the_sky_seen_from_inside_glass() {
-    let camera = narrow(dvec3(0.0, -1.0, 0.0), DVec3::ZERO);
-    let scene = glass_over_a_floor(Material::lambert("black", [0.0; 3]), -2.0, camera);
-    let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
-    assert_mean(&sbdpt(&scene.job().size(16, 16), 4, 64).render(), 2.16, "sky seen from inside glass");
+    let job = sky_from_inside_glass().job().size(16, 16);
+    assert_mean(&sbdpt(&job, 4, 64).render(), 2.16, "sky seen from inside glass");
 }
 
 /// Check 15: an emitter inside glass seen from outside at normal incidence: .96/2.25 = .4266667.
 #[test]
 fn radiance_of_an_emitter_inside_glass() {
-    let scene = glass_over_a_floor(Material::emitter("light", [1.0; 3]), -1.0, narrow(DVec3::Y, DVec3::ZERO));
-    let scene = BuiltScene::new(&scene, None);
-    assert_mean(&sbdpt(&scene.job().size(16, 16), 4, 64).render(), 0.426_666_7, "emitter inside glass");
+    let job = emitter_inside_glass().job().size(16, 16);
+    assert_mean(&sbdpt(&job, 4, 64).render(), 0.426_666_7, "emitter inside glass");
 }
 
 /// Check 15: a floor inside glass gets 1 - F_ext = .9082220 of the light of a sky above. Importance carries no factor: with one, the
@@ -497,45 +352,6 @@ fn floor_inside_glass_under_a_sky() {
     assert_differ(&wrong, &right, "as if importance were radiance, light outside");
 }
 
-/// Check 15 the other way round: a lamp inside a ball of glass that absorbs lights a floor outside.
-#[test]
-fn floor_beside_a_lamp_inside_glass() {
-    let mut scene = SceneBuilder::new();
-    let floor = scene.material(Material::lambert("floor", [0.7, 0.6, 0.5]));
-    let bottle = Some(([0.4, 0.7, 0.9], 0.5));
-    let glass = scene.material(Material { attenuation: bottle, ..Material::glass("glass", 1.5, 0.0) });
-    let lamp = scene.material(Material::emitter("lamp", [5.0, 4.0, 3.0]));
-    scene.floor(floor, 0.0, 4.0);
-    scene.mesh(glass, sphere(dvec3(0.0, 0.7, 0.0), 0.5, 12).flat());
-    scene.mesh(lamp, sphere(dvec3(0.0, 0.7, 0.0), 0.3, 8).flat());
-    scene.camera("main", Camera { eye: dvec3(0.0, 0.15, 3.0), target: dvec3(0.0, 0.0, 0.0), yfov: 6.0, aspect: 2.0 });
-    let scene = BuiltScene::new(&scene, None);
-    let job = scene.job().size(64, 32).edges(4);
-    let from_camera = job.clone().pipeline("pt").samples(128).render();
-    assert_agree(&job.clone().pipeline("lt").samples(128).render(), &from_camera, "lt and pt");
-    let job = job.pipeline("sbdpt").samples(32);
-    assert_agree(&job.render(), &from_camera, "sbdpt and pt");
-    let wrong = job.set("counting", "first").set("refraction_adjoint", false).render();
-    assert_differ(&wrong, &from_camera, "as if importance were radiance");
-}
-
-/// Check 18: a coarse sphere with smooth normals. Without the correction of light walks the image is another one, which shows best
-/// where neither sampled light nor joined walks help.
-#[test]
-fn sbdpt_agrees_on_a_coarse_sphere_with_smooth_normals() {
-    let scene = ball_beside_a_wall(Material::lambert("clay", [0.8, 0.5, 0.3]), 3);
-    let job = scene.job().size(64, 64).edges(4);
-    let expected = job.clone().pipeline("pt").samples(64).render();
-    let job = job.pipeline("sbdpt").set("counting", "first").samples(32);
-    let splats = job.clone().set("use_explicit", false).set("use_connection", false);
-    for rendering in [job.render(), splats.render()] {
-        assert_agree(&rendering, &expected, "smooth normals");
-        assert_same(&rendering.pixels, &expected.pixels, 8, 0.01, "smooth normals, small blocks");
-    }
-    let wrong = worst_of_blocks(&splats.set("shading_normal_adjoint", false).render().pixels, &expected.pixels, 8);
-    assert!(wrong.largest > 12.0, "without the correction: {wrong:?}");
-}
-
 /// Check 18: where faces are flat the correction changes nothing, to the bit.
 #[test]
 fn flat_faces_need_no_correction() {
@@ -547,77 +363,6 @@ fn flat_faces_need_no_correction() {
         corrected.sums == job.set("shading_normal_adjoint", false).render().sums,
         "the correction changes the image"
     );
-}
-
-/// A closed room with a block, a light under the ceiling and a panel that emits from both sides, all in the picture.
-fn closed_box() -> BuiltScene {
-    let mut scene = SceneBuilder::new();
-    let wall = scene.material(Material::lambert("wall", [0.75, 0.7, 0.65]));
-    let block = scene.material(Material::lambert("block", [0.6, 0.3, 0.2]));
-    let light = scene.material(Material::emitter("light", [6.0, 5.0, 4.0]));
-    let panel = scene.material(Material::emitter("panel", [1.0, 2.0, 3.0]).two_sided());
-    scene.room(wall, DVec3::splat(-1.0), DVec3::splat(1.0));
-    scene.mesh(block, turned_cuboid(dvec3(-0.6, -1.0, -0.5), dvec3(0.0, 0.1, 0.1), 0.4));
-    scene.ceiling(light, 0.98, 0.6);
-    scene.quad(panel, dvec3(0.3, -0.3, -0.3), DVec3::X * 0.4, DVec3::Y * 0.5);
-    scene.camera("main", Camera { eye: dvec3(0.3, 0.1, 0.95), target: dvec3(0.0, -0.1, 0.0), yfov: 80.0, aspect: 1.0 });
-    BuiltScene::new(&scene, None)
-}
-
-/// Edges of the longest path in the closed box.
-const BOX_EDGES: u32 = 4;
-
-fn box_job(scene: &BuiltScene, pipeline: &str, samples: u32) -> Job {
-    scene.job().pipeline(pipeline).size(32, 32).edges(BOX_EDGES).samples(samples).seed(2)
-}
-
-/// The closed box by `pt`.
-static BOX: LazyLock<Rendering> = LazyLock::new(|| box_job(&closed_box(), "pt", 256).seed(1).render());
-
-/// Checks 10 and 11: a closed box, whatever the weights and the count of implicit samples.
-#[test]
-fn sbdpt_agrees_on_a_closed_box() {
-    let scene = closed_box();
-    for (mis, counting) in [BALANCE, POWER, AVERAGE] {
-        let rendering = box_job(&scene, "sbdpt", 32).set("mis", mis).set("counting", counting).render();
-        assert_agree(&rendering, &BOX, &format!("{mis}, {counting}"));
-    }
-    assert_agree(&box_job(&scene, "lt", 64).render(), &BOX, "lt and pt");
-}
-
-/// What ends walks by chance leaves the mean of every pipeline as it was.
-#[test]
-fn roulette_keeps_the_mean() {
-    let scene = closed_box();
-    for (pipeline, samples, key, value) in [
-        ("pt", 64, "roulette", "true"),
-        ("nee", 64, "roulette", "true"),
-        ("lt", 128, "roulette", "true"),
-        ("sbdpt", 32, "roulette", "true"),
-        ("pt", 64, "regularise", "roulette"),
-        ("sbdpt", 32, "regularise", "roulette"),
-    ] {
-        let job = box_job(&scene, pipeline, samples).set("roulette_start", 1).set(key, value);
-        assert_agree(&job.render(), &BOX, &format!("{pipeline}, {key}"));
-    }
-}
-
-/// What ends walks that can no longer be joined leaves the mean as it was.
-#[test]
-fn early_ends_keep_the_mean() {
-    let rendering = box_job(&closed_box(), "sbdpt", 32).set("early_end", true).render();
-    assert_agree(&rendering, &BOX, "early_end");
-}
-
-/// Walks that end behind two diffuse vertices take light away.
-#[test]
-fn cutting_walks_darkens() {
-    let scene = closed_box();
-    for pipeline in ["pt", "sbdpt"] {
-        let cut = box_job(&scene, pipeline, 32).set("regularise", "cut").render();
-        assert_differ(&cut, &BOX, pipeline);
-        assert!(cut.pixels.mean_estimate().mean < BOX.pixels.mean_estimate().mean, "{pipeline} became brighter");
-    }
 }
 
 /// Check 22: the error falls with the root of the number of samples.

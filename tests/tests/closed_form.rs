@@ -1,14 +1,15 @@
 //! Scenes whose radiance is known in closed form, rendered by every pipeline that can. The numbers are those of algorithm.md section 9.
 
-use glam::{DVec2, DVec3, dvec3};
+use glam::{DVec3, dvec3};
 use std::f64::consts::{FRAC_PI_2, PI};
+use tests::closed_form::{DISK_LIGHT, FloorLight, SPHERE_LIGHT, SQUARE_LIGHT};
 use tests::closed_form::{FLOOR, FROM_ABOVE, FROM_BELOW_THE_LIGHT, WIDE, assert_mean, ball_in_a_constant_sky};
-use tests::closed_form::{factor_of_unit_disk, factor_of_unit_square, floor_below_glass, furnace as furnace_room};
-use tests::closed_form::{glass_over_a_floor, grey, lambert_under_point, narrow, sky_above};
+use tests::closed_form::{emitter_inside_glass, floor_below_glass, furnace as furnace_room, glass_over_a_floor};
+use tests::closed_form::{grey, lambert_under_point, narrow, sky_above, sky_from_inside_glass};
 use tests::material::Material;
 use tests::rendering::{BuiltScene, Job, Rendering};
-use tests::scene_builder::{Camera, MaterialId, SceneBuilder};
-use tests::shape::{disk, quad, sphere};
+use tests::scene_builder::{Camera, SceneBuilder};
+use tests::shape::quad;
 use tests::sky::Sky;
 use tests::statistics::{Estimate, spread, z_scores};
 
@@ -159,25 +160,22 @@ fn directional_light_on_a_plane_with_tilted_normals() {
 fn square_light_over_a_plane() {
     let mut scene = floor_seen_in_its_centre(0.5);
     let light = scene.material(Material::emitter("light", [1.0; 3]));
-    scene.ceiling(light, 1.0, 1.0);
+    (SQUARE_LIGHT.add)(&mut scene, light);
     let scene = BuiltScene::new(&scene, None);
     for pipeline in EYE_PIPELINES {
         let rendering = render_small(scene.job(), pipeline, 2, 1024);
         assert_mean(&rendering, 0.5 * 0.239_456_5, pipeline);
     }
-    assert_seen_from_below(|scene, light| scene.ceiling(light, 1.0, 1.0), factor_of_unit_square);
+    assert_lit_by(SQUARE_LIGHT);
 }
 
-/// Every pixel of a floor under a light of radiance 1 that all pipelines can sample.
+/// Every pixel of a floor under a light, by all pipelines.
 #[track_caller]
-fn assert_seen_from_below(add: impl Fn(&mut SceneBuilder, MaterialId), factor: impl Fn(DVec2) -> f64) {
-    let mut scene = FROM_BELOW_THE_LIGHT.floor(0.5, 20.0);
-    let light = scene.material(Material::emitter("light", [1.0; 3]));
-    add(&mut scene, light);
-    let scene = BuiltScene::new(&scene, None);
+fn assert_lit_by(light: FloorLight) {
+    let scene = light.over_a_floor();
     for (pipeline, samples) in [("nee", 1024), ("pt", 1024), ("lt", 16_384)] {
         let rendering = FROM_BELOW_THE_LIGHT.job(&scene, pipeline).samples(samples).render();
-        FROM_BELOW_THE_LIGHT.assert_pixels(&rendering, |place| 0.5 * factor(place), pipeline);
+        light.assert_pixels(&rendering, pipeline);
     }
 }
 
@@ -186,25 +184,21 @@ fn assert_seen_from_below(add: impl Fn(&mut SceneBuilder, MaterialId), factor: i
 fn disk_light_over_a_plane() {
     let mut scene = floor_seen_in_its_centre(0.5);
     let light = scene.material(Material::emitter("light", [1.0; 3]));
-    scene.mesh(light, disk(DVec3::Y, DVec3::NEG_Y, 1.0, 128));
+    (DISK_LIGHT.add)(&mut scene, light);
     let scene = BuiltScene::new(&scene, None);
     for pipeline in EYE_PIPELINES {
         let rendering = render_small(scene.job(), pipeline, 2, 1024);
         assert_mean(&rendering, 0.5 / PI * FRAC_PI_2, pipeline);
     }
-    let add = |scene: &mut SceneBuilder, light| scene.mesh(light, disk(DVec3::Y, DVec3::NEG_Y, 1.0, 128));
-    assert_seen_from_below(add, factor_of_unit_disk);
+    assert_lit_by(DISK_LIGHT);
 }
 
 /// Check 6: E = pi Le (R/D)^2 under a sphere: R = .5, D = 2 gives .1963495.
 #[test]
 fn sphere_light_over_a_plane() {
-    const RINGS: u32 = 48;
-    let slice = PI / f64::from(RINGS);
-    let same_area_seen_from_below = 0.5 * (slice / slice.sin()).sqrt();
     let mut scene = floor_seen_in_its_centre(0.5);
     let light = scene.material(Material::emitter("light", [1.0; 3]));
-    scene.mesh(light, sphere(DVec3::Y * 2.0, same_area_seen_from_below, RINGS));
+    (SPHERE_LIGHT.add)(&mut scene, light);
     let scene = BuiltScene::new(&scene, None);
     for pipeline in EYE_PIPELINES {
         let rendering = render_small(scene.job(), pipeline, 2, 4096);
@@ -213,12 +207,7 @@ fn sphere_light_over_a_plane() {
         let z = estimate.z(&Estimate::exact(expected), 1e-3 * expected);
         assert!(z.abs() < 4.5, "{pipeline}: {estimate:?}, expected {expected}");
     }
-    let add =
-        |scene: &mut SceneBuilder, light| scene.mesh(light, sphere(DVec3::Y * 2.0, same_area_seen_from_below, RINGS));
-    assert_seen_from_below(add, |place| {
-        let distance = place.length().hypot(2.0);
-        (0.5 / distance).powi(2) * 2.0 / distance
-    });
+    assert_lit_by(SPHERE_LIGHT);
 }
 
 /// Check 1: walls that emit 1 and reflect rho give the sum of rho^i below the number of edges.
@@ -233,18 +222,13 @@ fn furnace() {
 /// Check 15: out of glass at normal incidence radiance grows by eta^2 and loses 4 %: 2.25 x .96 = 2.16.
 #[test]
 fn radiance_of_the_sky_seen_from_inside_glass() {
-    let scene =
-        glass_over_a_floor(Material::lambert("black", [0.0; 3]), -2.0, narrow(dvec3(0.0, -1.0, 0.0), DVec3::ZERO));
-    let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
-    assert_mean(&render_small(scene.job(), "pt", 4, 1024), 2.16, "sky seen from inside glass");
+    assert_mean(&render_small(sky_from_inside_glass().job(), "pt", 4, 1024), 2.16, "sky seen from inside glass");
 }
 
 /// Check 15: an emitter inside glass seen from outside at normal incidence: .96/2.25 = .4266667.
 #[test]
 fn radiance_of_an_emitter_inside_glass() {
-    let scene = glass_over_a_floor(Material::emitter("light", [1.0; 3]), -1.0, narrow(DVec3::Y, DVec3::ZERO));
-    let scene = BuiltScene::new(&scene, None);
-    assert_mean(&render_small(scene.job(), "pt", 4, 1024), 0.426_666_7, "emitter inside glass");
+    assert_mean(&render_small(emitter_inside_glass().job(), "pt", 4, 1024), 0.426_666_7, "emitter inside glass");
 }
 
 /// Check 15: total reflection begins at 41.8103 degrees inside glass of index 1.5.

@@ -38,8 +38,13 @@ pub(super) fn begin_kernel(start_rays: Option<RayKind>) -> String {
 /// What a prepare kernel hands to a kernel behind it.
 #[derive(Clone, Debug)]
 pub(super) enum Entries {
-    /// All paths that wait for a stage.
-    Stage(String),
+    /// All paths that wait for a stage, which may be put in order before its kernel runs.
+    Stage {
+        /// The stage.
+        stage: String,
+        /// Whether they are.
+        ordered: bool,
+    },
     /// All records that wait in a stream.
     Stream(String),
     /// All records that wait in a stream or none: none if as many can join them as waiting paths may still push. `ahead` holds the
@@ -59,15 +64,13 @@ pub(super) struct Prepared {
     pub entries: Entries,
     /// What its rays are counted as.
     pub rays: Option<RayKind>,
-    /// Whether the paths are put in order before their kernel runs.
-    pub ordered: bool,
 }
 
 impl Prepared {
     /// The statements that do it.
     fn statements(&self, imports: &mut Imports) -> String {
         let mut text = self.counted(imports);
-        if let (Entries::Stage(stage), true) = (&self.entries, self.ordered) {
+        if let Entries::Stage { stage, ordered: true } = &self.entries {
             imports.add("queue", ["open_order"]);
             let _ = writeln!(text, "    open_order({});", stage_constant(stage));
         }
@@ -89,7 +92,7 @@ impl Prepared {
     /// The call that sizes the dispatch and gives the number of entries.
     fn call(&self, imports: &mut Imports) -> String {
         match &self.entries {
-            Entries::Stage(stage) => {
+            Entries::Stage { stage, .. } => {
                 let constant = stage_constant(stage);
                 imports.add("queue", ["start_queue", constant.as_str()]);
                 imports.add("pass", ["path_count"]);

@@ -158,11 +158,12 @@ impl Builder<'_> {
 
     fn prepared_stage(&self, stage: &str) -> Prepared {
         let rays = self.program.wiring.stages[stage].rays;
-        Prepared { entries: Entries::Stage(stage.to_owned()), rays, ordered: self.program.queues.is_ordered(stage) }
+        let ordered = self.program.queues.is_ordered(stage);
+        Prepared { entries: Entries::Stage { stage: stage.to_owned(), ordered }, rays }
     }
 
     fn prepared_stream(&self, name: &str, entries: Entries) -> Prepared {
-        Prepared { entries, rays: self.program.wiring.streams[name].rays, ordered: false }
+        Prepared { entries, rays: self.program.wiring.streams[name].rays }
     }
 
     /// Empties a stream before a group of stages if this group and those after it might overfill it.
