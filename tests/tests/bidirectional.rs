@@ -329,15 +329,15 @@ fn toy_under_a_sky() {
 /// Check 15: out of glass at normal incidence radiance grows by eta^2 and loses 4 %: 2.25 x .96 = 2.16.
 #[test]
 fn radiance_of_the_sky_seen_from_inside_glass() {
-    let job = sky_from_inside_glass().job().size(16, 16);
-    assert_mean(&sbdpt(&job, 4, 64).render(), 2.16, "sky seen from inside glass");
+    let scene = sky_from_inside_glass();
+    assert_mean(&sbdpt(&scene.job().size(16, 16), 4, 64).render(), 2.16, "sky seen from inside glass");
 }
 
 /// Check 15: an emitter inside glass seen from outside at normal incidence: .96/2.25 = .4266667.
 #[test]
 fn radiance_of_an_emitter_inside_glass() {
-    let job = emitter_inside_glass().job().size(16, 16);
-    assert_mean(&sbdpt(&job, 4, 64).render(), 0.426_666_7, "emitter inside glass");
+    let scene = emitter_inside_glass();
+    assert_mean(&sbdpt(&scene.job().size(16, 16), 4, 64).render(), 0.426_666_7, "emitter inside glass");
 }
 
 /// Check 15: a floor inside glass gets 1 - F_ext = .9082220 of the light of a sky above. Importance carries no factor: with one, the
