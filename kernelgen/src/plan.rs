@@ -29,8 +29,10 @@ pub struct Plan {
     pub layers: Vec<Layers>,
     /// How film words are to be read.
     pub film: Accumulate,
-    /// Bytes of state a path slot takes, all tables.
+    /// Bytes of state a path slot takes, rays in flight left out where the layout keeps them apart.
     pub bytes_per_path: u32,
+    /// Bytes of its rays in flight, where the layout keeps them apart.
+    pub ray_bytes_per_path: u32,
     /// Slots that a pass may use of every `SLOT_GRAIN`: all, unless a stream has less room than all could fill in one round.
     pub slots_per_grain: u32,
     /// Whether kernels use subgroup operations, f16, f64, 64-bit atomics or float atomics: features to ask of the adapter.

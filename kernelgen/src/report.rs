@@ -7,7 +7,7 @@ use crate::layout::{self, Placement, StateLeaf};
 use crate::plan::Plan;
 use crate::source::{Sources, Span};
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// The report on a variant.
@@ -15,8 +15,10 @@ use std::fmt::Write;
 pub struct Report {
     /// Names of the pipeline, layout, schedule and precision.
     pub variant: [String; 4],
-    /// Bytes of state a path takes, all tables.
+    /// Bytes of state a path takes, rays in flight left out where the layout keeps them apart.
     pub bytes_per_path: u32,
+    /// Bytes of its rays in flight, where the layout keeps them apart.
+    pub ray_bytes_per_path: u32,
     /// Tables of state.
     pub tables: Vec<TableReport>,
     /// Kernels, in the order of the plan.
@@ -49,7 +51,7 @@ pub struct TableReport {
 pub struct FieldReport {
     /// `eye.hit.prim`.
     pub name: String,
-    /// `f32`, `u32` or `bits`.
+    /// `f32`, `u32`, `bits` or the name of a codec.
     pub codec: String,
     /// Bits it takes.
     pub bits: u32,
@@ -57,10 +59,23 @@ pub struct FieldReport {
     pub word: u32,
     /// All its words.
     pub words: Vec<u32>,
-    /// Its lowest bit in the word.
+    /// Its lowest bit in the first word.
     pub shift: u32,
+    /// The bits of each of its parts.
+    pub places: Vec<Place>,
     /// Fields that live in the same bits at other times.
     pub shares: Vec<String>,
+}
+
+/// Bits of a word of the path's record.
+#[derive(Clone, Debug, Serialize)]
+pub struct Place {
+    /// The word.
+    pub word: u32,
+    /// Lowest bit.
+    pub shift: u32,
+    /// How many.
+    pub bits: u32,
 }
 
 /// A kernel.
@@ -111,6 +126,7 @@ struct FieldUse {
     read: Vec<String>,
     live_out: Vec<String>,
     stored: Option<String>,
+    shares: Vec<String>,
     dead: Option<String>,
 }
 
@@ -130,6 +146,7 @@ pub(crate) fn build(findings: &Findings<'_>) -> Report {
     let variant = findings.variant;
     let leaves = layout::state_leaves(&variant.pipeline);
     Report {
+        ray_bytes_per_path: findings.plan.ray_bytes_per_path,
         variant: [
             variant.pipeline.name.clone(),
             variant.layout.name.clone(),
@@ -137,7 +154,7 @@ pub(crate) fn build(findings: &Findings<'_>) -> Report {
             variant.precision.name.clone(),
         ],
         bytes_per_path: findings.plan.bytes_per_path,
-        tables: tables(findings, &leaves),
+        tables: tables(findings),
         kernels: kernels(findings),
         dead: leaves.iter().filter_map(|leaf| dead(findings, leaf)).collect(),
         effects: effects(findings),
@@ -145,12 +162,11 @@ pub(crate) fn build(findings: &Findings<'_>) -> Report {
     }
 }
 
-fn tables(findings: &Findings<'_>, leaves: &[StateLeaf]) -> Vec<TableReport> {
+fn tables(findings: &Findings<'_>) -> Vec<TableReport> {
     let placement = findings.placement;
-    let types: BTreeMap<&Leaf, LeafType> = leaves.iter().map(|leaf| (&leaf.leaf, leaf.ty)).collect();
     let table = |(index, table): (usize, &layout::Table)| {
         let own = placement.slots.iter().filter(|(_, slot)| slot.table == index);
-        let mut fields: Vec<FieldReport> = own.map(|(leaf, slot)| field(leaf, slot, &types)).collect();
+        let mut fields: Vec<FieldReport> = own.map(|(leaf, slot)| field(placement, leaf, slot)).collect();
         fields.sort_by_key(|field| (field.word, field.shift));
         TableReport {
             name: table.name.clone(),
@@ -171,20 +187,34 @@ fn order(order: Order) -> String {
     }
 }
 
-fn field(leaf: &Leaf, slot: &layout::Slot, types: &BTreeMap<&Leaf, LeafType>) -> FieldReport {
-    let codec = match types.get(leaf) {
-        _ if slot.bits < 32 => "bits",
-        Some(LeafType::U32) | None => "u32",
-        Some(_) => "f32",
-    };
+fn field(placement: &Placement, leaf: &Leaf, slot: &layout::Slot) -> FieldReport {
+    let place = |bits: &layout::Bits| Place { word: bits.word, shift: bits.shift, bits: bits.bits };
+    let places: Vec<Place> = slot.parts.iter().map(place).collect();
     FieldReport {
         name: leaf.to_string(),
-        codec: codec.to_owned(),
-        bits: slot.bits * slot.words.len() as u32,
-        word: slot.words.first().copied().unwrap_or_default(),
-        words: slot.words.clone(),
-        shift: slot.shift,
-        shares: Vec::new(),
+        codec: placement.leaves.get(leaf).map(codec).unwrap_or_default(),
+        bits: places.iter().map(|place| place.bits).sum(),
+        word: places.first().map_or(0, |place| place.word),
+        words: words(&places),
+        shift: places.first().map_or(0, |place| place.shift),
+        shares: placement.shares(leaf).into_iter().map(Leaf::to_string).collect(),
+        places,
+    }
+}
+
+/// Different words, in the order of the parts.
+fn words(places: &[Place]) -> Vec<u32> {
+    let mut words: Vec<u32> = places.iter().map(|place| place.word).collect();
+    words.dedup();
+    words
+}
+
+fn codec(leaf: &StateLeaf) -> String {
+    match (&leaf.codec, leaf.ty) {
+        (Some(codec), _) => codec.name.clone(),
+        (None, LeafType::U32) if leaf.bits < 32 => "bits".to_owned(),
+        (None, LeafType::U32) => "u32".to_owned(),
+        (None, _) => "f32".to_owned(),
     }
 }
 
@@ -244,6 +274,7 @@ fn field_use(findings: &Findings<'_>, declared: &StateLeaf) -> FieldUse {
         read,
         live_out: live_out.map(|(stage, _)| stage.clone()).collect(),
         stored: findings.placement.slots.get(leaf).map(|slot| stored(findings.placement, slot)),
+        shares: findings.placement.shares(leaf).into_iter().map(Leaf::to_string).collect(),
         dead: findings.liveness.dead.get(leaf).cloned(),
     }
 }
@@ -267,13 +298,17 @@ fn dead(findings: &Findings<'_>, declared: &StateLeaf) -> Option<Reason> {
 
 fn stored(placement: &Placement, slot: &layout::Slot) -> String {
     let table = &placement.tables[slot.table].name;
-    let words: Vec<String> = slot.words.iter().map(u32::to_string).collect();
-    let noun = if words.len() == 1 { "word" } else { "words" };
-    let bits = match slot.bits {
-        32 => String::new(),
-        bits => format!(", bits {} to {}", slot.shift, slot.shift + bits - 1),
-    };
-    format!("{noun} {}{bits} of table {table}", words.join(", "))
+    let places: Vec<String> = slot.parts.iter().map(place_text).collect();
+    let noun = if places.len() == 1 { "word" } else { "words" };
+    format!("{noun} {} of table {table}", places.join(", "))
+}
+
+/// `7`, or `7 (bits 8 to 15)`.
+fn place_text(part: &layout::Bits) -> String {
+    match part.bits {
+        32 => part.word.to_string(),
+        bits => format!("{} (bits {} to {})", part.word, part.shift, part.shift + bits - 1),
+    }
 }
 
 /// `stages/trace.wgsl:40`.
@@ -288,7 +323,11 @@ impl Report {
     pub fn text(&self) -> String {
         let [pipeline, layout, schedule, precision] = &self.variant;
         let mut text = format!("{pipeline} x {layout} x {schedule} x {precision}\n");
-        let _ = writeln!(text, "{} bytes of state a path\n", self.bytes_per_path);
+        let rays = match self.ray_bytes_per_path {
+            0 => String::new(),
+            bytes => format!(", and {bytes} of rays in flight"),
+        };
+        let _ = writeln!(text, "{} bytes of state a path{rays}\n", self.bytes_per_path);
         for table in &self.tables {
             let _ = writeln!(
                 text,
@@ -364,13 +403,18 @@ fn push_use(text: &mut String, indent: &str, leaf: &FieldUse) {
     if let Some(stored) = &leaf.stored {
         let _ = writeln!(text, "{indent}stored in {stored}");
     }
+    if !leaf.shares.is_empty() {
+        let _ = writeln!(text, "{indent}shares bits with {}", leaf.shares.join(", "));
+    }
     if let Some(reason) = &leaf.dead {
         let _ = writeln!(text, "{indent}dead: {reason}");
     }
 }
 
 fn table_rows(table: &TableReport) -> Vec<Vec<String>> {
-    let mut rows = vec![["  field", "codec", "bits", "words", "shift"].map(str::to_owned).to_vec()];
+    let shared = table.fields.iter().any(|field| !field.shares.is_empty());
+    let heading = ["  field", "codec", "bits", "words", "shift"].into_iter().chain(shared.then_some("shares with"));
+    let mut rows = vec![heading.map(str::to_owned).collect()];
     rows.extend(table.fields.iter().map(|field| {
         let words: Vec<String> = field.words.iter().map(u32::to_string).collect();
         vec![
@@ -379,6 +423,7 @@ fn table_rows(table: &TableReport) -> Vec<Vec<String>> {
             field.bits.to_string(),
             words.join(" "),
             field.shift.to_string(),
+            field.shares.join(" "),
         ]
     }));
     rows

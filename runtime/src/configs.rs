@@ -88,6 +88,7 @@ impl Default for Library {
         for (key, text) in CONFIGS {
             sources.add(FileKind::Config, *key, format!("configs/{key}"), *text);
         }
+        sources.add(FileKind::Config, "codecs.toml", "stages/codecs.toml", stages::CODECS);
         for module in stages::modules() {
             sources.add(FileKind::Module, module.path, module.name, module.text);
         }

@@ -11,6 +11,9 @@ pub struct Module {
     pub text: &'static str,
 }
 
+/// The codecs among them: what each keeps, in how many bits, at what loss.
+pub const CODECS: &str = include_str!("../codecs.toml");
+
 /// All modules, sorted by path.
 pub fn modules() -> &'static [Module] {
     include!(concat!(env!("OUT_DIR"), "/modules.rs"))

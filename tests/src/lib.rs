@@ -7,6 +7,7 @@ pub mod glb;
 pub mod how_to;
 pub mod material;
 pub mod mutation;
+pub mod poison;
 pub mod probe;
 pub mod refuse;
 pub mod rendering;

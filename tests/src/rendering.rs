@@ -1,9 +1,11 @@
 //! Renders scenes for tests, two at a time, on the best adapter of the machine: Mesa's software driver in CI.
 
+use crate::poison::poison;
 use crate::scene_builder::SceneBuilder;
 use crate::sky::Sky;
 use crate::statistics::Pixels;
-use kernelgen::plan::Plan;
+use kernelgen::Generated;
+use kernelgen::report::Report;
 use kernelgen::source::FileKind;
 use runtime::configs::Library;
 use runtime::device::{DeviceOptions, Gpu};
@@ -52,6 +54,7 @@ pub struct Job {
     size: [u32; 2],
     samples: u32,
     seed: u32,
+    poisoned: bool,
 }
 
 /// A rendered image and what was counted.
@@ -82,6 +85,7 @@ impl Job {
             size: [32, 32],
             samples: 64,
             seed: 1,
+            poisoned: false,
         }
     }
 
@@ -159,6 +163,12 @@ impl Job {
         self
     }
 
+    /// Kernels begin with garbage in every field that they do not load.
+    pub fn poisoned(mut self) -> Job {
+        self.poisoned = true;
+        self
+    }
+
     /// `--set KEY=VALUE`.
     pub fn set(mut self, key: &str, value: impl ToString) -> Job {
         self.settings.set.insert(key.into(), SetValue::Text(value.to_string()));
@@ -179,7 +189,10 @@ impl Job {
     #[track_caller]
     pub fn render(&self) -> Rendering {
         let mut scene = self.load();
-        let plan = self.generate(&scene).unwrap_or_else(|refusal| panic!("{refusal}"));
+        let mut plan = self.generate(&scene).unwrap_or_else(|refusal| panic!("{refusal}")).plan;
+        if self.poisoned {
+            poison(&mut plan);
+        }
         if plan.buffers.iter().any(|buffer| buffer.name == "bvh2_nodes") {
             scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
         }
@@ -208,14 +221,17 @@ impl Job {
         self.generate(&self.load()).map(drop)
     }
 
-    fn generate(&self, scene: &Scene) -> Result<Plan, String> {
+    /// What lives where.
+    #[track_caller]
+    pub fn report(&self) -> Report {
+        self.generate(&self.load()).unwrap_or_else(|refusal| panic!("{refusal}")).report
+    }
+
+    fn generate(&self, scene: &Scene) -> Result<Generated, String> {
         let mut library = self.library.clone();
         let selection =
             self.settings.selection(&mut library, scene.effects.clone()).map_err(|error| error.to_string())?;
-        match kernelgen::generate(&library.sources, &selection) {
-            Ok(generated) => Ok(generated.plan),
-            Err(refusal) => Err(refusal.render(false)),
-        }
+        kernelgen::generate(&library.sources, &selection).map_err(|refusal| refusal.render(false))
     }
 }
 

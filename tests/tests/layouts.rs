@@ -1,18 +1,20 @@
-//! The layout never changes the image: bit for bit with the fixed-point film, for every layout in `configs/layouts`.
+//! The layout never changes what the image converges to: layouts that keep every bit give the same image bit for bit with the
+//! fixed-point film, those with codecs one that differs by what these declare.
 
+use runtime::configs::Axis;
 use std::collections::BTreeSet;
-use std::fs;
-use std::path::Path;
-use tests::rendering::{Job, shipped};
+use tests::rendering::{Job, Rendering, shipped};
 
-fn layouts() -> Vec<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/layouts");
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .expect("configs/layouts is there")
-        .filter_map(|entry| entry.expect("the folder can be read").path().file_stem()?.to_str().map(str::to_owned))
-        .collect();
-    names.sort();
-    names
+/// Shipped layouts by name: those whose codecs keep every bit, or those that do not.
+fn layouts(lossless: bool) -> Vec<&'static str> {
+    let keeps = |name: &&str| {
+        let report = ["sbdpt", "pt", "sbdpt_seed"].into_iter().map(|pipeline| job(pipeline).layout(name));
+        let report = report.filter(|job| job.check().is_ok()).map(|job| job.report()).next();
+        let tables = report.expect("the layout fits a pipeline").tables;
+        let mut fields = tables.iter().flat_map(|table| &table.fields);
+        fields.all(|field| ["f32", "u32", "bits"].contains(&field.codec.as_str())) == lossless
+    };
+    Axis::Layout.names().into_iter().filter(keeps).collect()
 }
 
 fn job(pipeline: &str) -> Job {
@@ -20,11 +22,26 @@ fn job(pipeline: &str) -> Job {
 }
 
 #[test]
-fn aos_soa_and_aosoa_are_shipped() {
-    let layouts = layouts();
-    for name in ["aos", "soa", "aosoa32"] {
-        assert!(layouts.iter().any(|layout| layout == name), "configs/layouts/{name}.toml is missing");
-    }
+fn layouts_of_both_kinds_are_shipped() {
+    assert_eq!(
+        layouts(true),
+        ["aos", "aosoa32", "compact", "pt_placed", "seed_aos", "soa", "split_compact", "split_soa"]
+    );
+    assert_eq!(layouts(false), ["compact_lossy", "compact_near", "split_compact_lossy", "split_compact_near"]);
+}
+
+/// Bytes of state a path with every effect, rays in flight left out, as the compiler finds them.
+#[test]
+fn states_are_as_small_as_they_can_be() {
+    let bytes = |pipeline: &str, layout: &str, light_kinds: &str| {
+        Job::of_file(shipped(light_kinds)).pipeline(pipeline).layout(layout).report().bytes_per_path
+    };
+    // A bottle that absorbs: with the numbers of what walks are inside of.
+    let found = ["compact", "compact_near", "compact_lossy"].map(|layout| bytes("sbdpt", layout, "bottle"));
+    assert_eq!(found, [72, 44, 32]);
+    assert_eq!(bytes("sbdpt_seed", "seed_aos", "bottle"), 224);
+    let matt = ["compact", "compact_near", "compact_lossy"].map(|layout| bytes("sbdpt", layout, "cornell_box"));
+    assert!(matt[0] <= 72 && matt[1] <= 44 && matt[2] <= 32 && matt != [72, 44, 32], "{matt:?}");
 }
 
 /// A layout that places fields by name fits the pipelines that have these fields; every layout fits one of them.
@@ -34,8 +51,8 @@ fn every_layout_gives_the_same_bits() {
     for pipeline in ["nee", "pt", "lt", "sbdpt", "sbdpt_seed"] {
         let expected = job(pipeline).layout("aos").render();
         assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
-        for layout in layouts() {
-            let job = job(pipeline).layout(&layout);
+        for layout in layouts(true).into_iter().filter(|layout| *layout != "aos") {
+            let job = job(pipeline).layout(layout);
             if let Err(refusal) = job.check() {
                 let of_another = ["no such field", "is placed nowhere"].iter().any(|reason| refusal.contains(reason));
                 assert!(of_another, "{pipeline} with {layout}: {refusal}");
@@ -46,7 +63,52 @@ fn every_layout_gives_the_same_bits() {
             fitting.insert(layout);
         }
     }
-    assert_eq!(fitting.into_iter().collect::<Vec<_>>(), layouts(), "each fits a pipeline");
+    fitting.insert("aos");
+    assert_eq!(fitting.into_iter().collect::<Vec<_>>(), layouts(true), "each fits a pipeline");
+}
+
+/// Mean over all pixels and channels.
+fn mean(rendering: &Rendering) -> f64 {
+    let pixels = &rendering.pixels.rgb;
+    pixels.iter().flatten().map(|&value| f64::from(value)).sum::<f64>() / (3 * pixels.len()) as f64
+}
+
+/// Root mean square over all pixels and channels of what `of` makes of each.
+fn root_mean_square(rendering: &Rendering, of: impl Fn(usize, usize) -> f64) -> f64 {
+    let count = rendering.pixels.rgb.len();
+    let sum: f64 =
+        (0..count).flat_map(|pixel| (0..3).map(move |channel| (pixel, channel))).map(|(p, c)| of(p, c).powi(2)).sum();
+    (sum / (3 * count) as f64).sqrt()
+}
+
+/// With the same random numbers: the mean moves by less than a thousandth, pixels by far less than the noise of a sample.
+#[test]
+fn lossy_layouts_stay_within_what_their_codecs_declare() {
+    const SAMPLES: u32 = 64;
+    for pipeline in ["pt", "sbdpt"] {
+        let job = job(pipeline).samples(SAMPLES);
+        let exact = job.clone().layout("soa").render();
+        let noise = root_mean_square(&exact, |pixel, channel| f64::from(exact.pixels.errors[pixel][channel]));
+        let one_sample = noise * f64::from(SAMPLES).sqrt();
+        // Splitting tables moves fields, and codecs none of their bits.
+        for layout in layouts(false).into_iter().filter(|layout| !layout.starts_with("split")) {
+            let lossy = job.clone().layout(layout).render();
+            assert_eq!(lossy.rejected, 0);
+            let shift = mean(&lossy) / mean(&exact) - 1.0;
+            let moved = root_mean_square(&exact, |pixel, channel| {
+                f64::from(lossy.pixels.rgb[pixel][channel]) - f64::from(exact.pixels.rgb[pixel][channel])
+            });
+            eprintln!(
+                "{pipeline} with {layout}: mean {shift:+.2e}, pixels {:.2e} of a sample's noise",
+                moved / one_sample
+            );
+            assert!(shift.abs() < 1e-3, "{pipeline} with {layout}: the mean moves by {shift}");
+            assert!(
+                moved < 0.05 * one_sample,
+                "{pipeline} with {layout}: pixels move by {moved}, noise is {one_sample}"
+            );
+        }
+    }
 }
 
 /// Both acceleration structures find the same hits.

@@ -510,8 +510,8 @@ fn errors_of_walks() {
         Mutation {
             name: "walks enter a solid when they leave it",
             module: "transport/medium",
-            old: "return select(NO_MEDIUM, surface.material, surface.front);",
-            new: "return select(surface.material, NO_MEDIUM, surface.front);",
+            old: "return select(NO_MEDIUM, medium_of(surface), surface.front);",
+            new: "return select(medium_of(surface), NO_MEDIUM, surface.front);",
             check: &EMITTER_INSIDE_GLASS,
         },
         Mutation {

@@ -162,6 +162,7 @@ fn default_selection() -> model::Selection {
 fn real_configs(wanted: impl Fn(&str) -> bool) -> Sources {
     let root = project().join("configs");
     let mut sources = Sources::default();
+    sources.add(FileKind::Config, "codecs.toml", "stages/codecs.toml", stages::CODECS);
     for folder in FOLDERS {
         for path in files(&root.join(folder), "toml") {
             let name = path.file_name().expect("a file has a name").to_string_lossy();

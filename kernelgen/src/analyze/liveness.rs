@@ -20,6 +20,8 @@ pub struct FlowStage {
     pub facts: StageFacts,
     /// The stages its returned outcomes lead to; `end` left out.
     pub next: Vec<String>,
+    /// Whether it traces the rays of walks.
+    pub traces: bool,
 }
 
 /// What has to be kept between kernels.
@@ -31,6 +33,8 @@ pub struct Liveness {
     pub stored: BTreeSet<Leaf>,
     /// Leaves that stages write but no kernel has to store, with the reason: one line.
     pub dead: BTreeMap<Leaf, String>,
+    /// Stored leaves that are rays in flight: they live on the way into or out of kernels that trace and use them, and nowhere else.
+    pub in_flight: BTreeSet<Leaf>,
 }
 
 /// What a kernel moves, and what lives around it.
@@ -62,7 +66,18 @@ pub fn liveness(flow: &Flow) -> Liveness {
     let stored: BTreeSet<Leaf> =
         kernels.values().flat_map(|traffic| traffic.loads.iter().chain(&traffic.stores)).cloned().collect();
     let dead = dead(flow, &stored);
-    Liveness { kernels, stored, dead }
+    let in_flight = stored.iter().filter(|leaf| is_in_flight(flow, &kernels, leaf)).cloned().collect();
+    Liveness { kernels, stored, dead, in_flight }
+}
+
+fn is_in_flight(flow: &Flow, kernels: &IndexMap<String, KernelTraffic>, leaf: &Leaf) -> bool {
+    let traces = |name: &String| {
+        let traffic = &kernels[name];
+        flow.stages[name].traces && (traffic.loads.contains(leaf) || traffic.stores.contains(leaf))
+    };
+    let needs = |name: &&String| kernels.get(*name).is_some_and(|traffic| traffic.live_in.contains(leaf));
+    let lives_on = kernels.iter().filter(|(_, traffic)| traffic.live_out.contains(leaf)).map(|(name, _)| name);
+    lives_on.into_iter().all(|name| traces(name) || flow.stages[name].next.iter().filter(needs).all(traces))
 }
 
 fn traffic(stage: &FlowStage, kernels: &IndexMap<String, KernelTraffic>) -> KernelTraffic {
@@ -110,7 +125,7 @@ mod tests {
         let span = Span { file: FileId(0), start: 0, end: 0 };
         let map = |names: &str| set(names).into_iter().map(|leaf| (leaf, span)).collect();
         let facts = StageFacts { reads: map(reads), writes: map(writes), maybe: map(maybe), ..StageFacts::default() };
-        FlowStage { facts, next: next.iter().map(|name| name.to_string()).collect() }
+        FlowStage { facts, next: next.iter().map(|name| name.to_string()).collect(), traces: false }
     }
 
     fn solve(stages: &[(&str, FlowStage)]) -> Liveness {

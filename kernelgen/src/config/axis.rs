@@ -4,7 +4,7 @@ use super::merge::{self, AxisFile, LAYOUT, PIPELINE, PRECISION, SCHEDULE};
 use super::model::{Selection, Variant};
 use super::section::{Findings, Section};
 use super::tree::Table;
-use super::{feature, layout, pipeline, schedule, set, wiring};
+use super::{codec, feature, layout, pipeline, schedule, set, wiring};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::source::{Sources, Span};
 
@@ -58,7 +58,8 @@ fn convert(
     let schedule = schedule::read(schedule, &top(schedule), findings);
     let precision = schedule::read_precision(precision, &top(precision), findings);
     let effects = feature::read(sources, &selection.effects, &top(&files[0]), findings);
-    let variant = Variant { pipeline, layout: layout?, schedule: schedule?, precision: precision?, effects };
+    let codecs = codec::read(sources, findings);
+    let variant = Variant { pipeline, layout: layout?, schedule: schedule?, precision: precision?, effects, codecs };
     wiring::check(&variant, findings);
     Some(variant)
 }

@@ -22,6 +22,14 @@ pub fn evaluate_size(pipeline: &Pipeline, size: &Spanned<String>) -> Result<u32,
     evaluate("size", size, &pipeline.params, MAX_SIZE)
 }
 
+/// Evaluates the `max` of a counter, written as `rounds`.
+///
+/// # Errors
+/// K0116, as `evaluate_rounds`.
+pub(super) fn evaluate_max(params: &IndexMap<String, Param>, max: &Spanned<String>) -> Result<u32, Diagnostic> {
+    evaluate("max", max, params, u32::MAX)
+}
+
 /// A larger size is a mistake: there are indices for every pair of ends of the longest paths.
 const MAX_SIZE: u32 = 1 << 17;
 

@@ -1,7 +1,7 @@
 //! The layout axis: interleaving, tables, explicit placement.
 
 use super::merge::AxisFile;
-use super::model::{Layout, Order, Placed, PlacedField, PlacedRow};
+use super::model::{Encode, Layout, Order, Placed, PlacedField, PlacedRow};
 use super::section::{Findings, Item, Section};
 use super::tree::Data;
 use crate::diagnostic::Diagnostic;
@@ -9,7 +9,7 @@ use crate::source::Spanned;
 use indexmap::IndexMap;
 
 /// Keys of `[layout]`.
-pub const KEYS: [&str; 5] = ["order", "lane", "dead", "tables", "place"];
+pub const KEYS: [&str; 8] = ["order", "lane", "dead", "share", "rays", "encode", "tables", "place"];
 
 /// The layout; `None` when a required key is missing or refused.
 pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Option<Layout> {
@@ -20,6 +20,9 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let lane = section.require("lane", "32-bit words an access: `lane = 1`, `2` or `4`", findings);
     let lane = lane.and_then(|item| self::lane(&item, findings));
     let dead = section.get("dead").and_then(|item| item.word(&["drop", "keep"], findings));
+    let share = section.get("share").and_then(|item| item.boolean(findings));
+    let rays = section.get("rays").and_then(|item| item.word(&["beside", "apart"], findings));
+    let encode = encode(&section, findings);
     let tables = tables(&section, findings);
     let place = section.get("place").map(|item| rows(&item, findings)).unwrap_or_default();
     Some(Layout {
@@ -28,6 +31,9 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         order: order?,
         lane: lane?,
         drop_dead: dead != Some(1),
+        share: share.unwrap_or_default(),
+        rays_apart: rays == Some(1),
+        encode,
         tables,
         place,
         span: section.span,
@@ -70,6 +76,16 @@ fn lane(item: &Item<'_>, findings: &mut Findings) -> Option<u32> {
         findings.push(refused);
     }
     lane
+}
+
+fn encode(section: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Encode> {
+    let mut encode = IndexMap::new();
+    for item in section.entries("encode", findings) {
+        if let Some(codec) = item.text(findings) {
+            encode.insert(item.name.to_owned(), Encode { key: item.key, codec });
+        }
+    }
+    encode
 }
 
 fn tables(section: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Vec<Spanned<String>>> {

@@ -1,6 +1,8 @@
 //! The four axes as TOML: reading, `extends`, `--set`, checking.
 
 mod axis;
+mod codec;
+mod encode;
 mod expression;
 mod feature;
 mod layout;

@@ -48,6 +48,8 @@ pub struct Variant {
     pub precision: Precision,
     /// Which effects exist, pins (`[features]` in a config, `--set features.sky=true`) applied.
     pub effects: Effects,
+    /// Codecs by name.
+    pub codecs: IndexMap<String, Codec>,
 }
 
 /// What is computed: records, state, streams, parameters, stages and their wiring.
@@ -73,6 +75,9 @@ pub struct Pipeline {
     pub tallies: IndexMap<String, Tally>,
     /// Groups of layers by name.
     pub layers: IndexMap<String, Layers>,
+    /// Name to field: a value that stages must evaluate as it will come back from that field (`stored_NAME(value)`). Fields that the
+    /// state does not have keep every bit.
+    pub stored: IndexMap<String, Spanned<String>>,
     /// Stages by name, in the order in which a round runs them.
     pub stages: IndexMap<String, Stage>,
 }
@@ -199,11 +204,51 @@ pub struct Layout {
     pub lane: u32,
     /// Whether fields that no kernel boundary carries are dropped.
     pub drop_dead: bool,
-    /// Table name to instances; empty means one table named `state`.
+    /// Whether fields that never live together may have the same bits.
+    pub share: bool,
+    /// Whether rays in flight have a table of their own: what lives only on the way into and out of the kernels that trace it.
+    pub rays_apart: bool,
+    /// Codec by quantity (`spectrum`), field (`light.throughput`) or member of a hit (`light.hit.uv`); the closer name wins.
+    pub encode: IndexMap<String, Encode>,
+    /// Table name to instances; empty means one table named `state`. One that a pipeline may lack ends in `?`.
     pub tables: IndexMap<String, Vec<Spanned<String>>>,
     /// Explicit placement; empty means automatic. One row is one lane.
     pub place: Vec<PlacedRow>,
     /// Where the layout's table stands, for errors about it as a whole.
+    pub span: Span,
+}
+
+/// Ends the name of an instance in a table that not every pipeline has to have.
+pub const OPTIONAL: char = '?';
+
+/// The codecs that keep every bit: a value as it is computed.
+pub const IDENTITY_CODECS: [&str; 2] = ["f32", "u32"];
+
+/// An entry of `[layout.encode]`.
+#[derive(Clone, Debug)]
+pub struct Encode {
+    /// Where the name of what is encoded stands.
+    pub key: Span,
+    /// The codec's name; `f32` and `u32` keep every bit.
+    pub codec: Spanned<String>,
+}
+
+/// A pair of WGSL functions that keep a value in fewer bits: `encode_NAME` and `decode_NAME` in the module `codec::NAME`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Codec {
+    /// Its name.
+    pub name: String,
+    /// The quantities that it can keep.
+    pub quantities: Vec<String>,
+    /// Width in bits of every part. One part is a `u32`, more are a `vec2u` or `vec3u`, each in the lowest bits.
+    pub parts: Vec<u32>,
+    /// What is lost at most, by kind: `angle` in radians, `relative`, `of_largest` component, `absolute`.
+    pub errors: IndexMap<String, f64>,
+    /// Least and greatest magnitude for which that holds; smaller ones may become zero, greater ones the greatest. Zero is kept.
+    pub range: [f64; 2],
+    /// One line about it.
+    pub doc: String,
+    /// Where its table stands.
     pub span: Span,
 }
 

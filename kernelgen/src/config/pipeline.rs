@@ -1,30 +1,35 @@
 //! The pipeline axis: records, instances, streams, tallies, layers, stages.
 
 use super::merge::AxisFile;
-use super::model::{Field, Layers, Pipeline, RayKind, Record, Stage, Stream, Tally};
+use super::model::{Field, Layers, Param, Pipeline, RayKind, Record, Stage, Stream, Tally};
 use super::quantity::Quantity;
 use super::section::{Findings, Item, Section};
-use super::{name, param, suggest};
+use super::{expression, name, param, suggest};
 use crate::diagnostic::Diagnostic;
 use crate::source::{Span, Spanned};
 use indexmap::IndexMap;
+
+/// Parameters by name.
+type Params = IndexMap<String, Param>;
 
 /// The pipeline as far as it can be read; what is refused is in `findings`, and something stands in for it.
 pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Pipeline {
     let start_help = "name the stage that every path begins with: `start = \"emit_eye\"`; a file of shared parts, \
                       as `base.toml`, can be extended but not chosen";
     let rounds_help = "bound the rounds: `rounds = \"max_edges\"`";
+    let params = param::read(top, findings);
     Pipeline {
         name: file.name.clone(),
         doc: file.doc.clone(),
         start: required_text(top, "start", start_help, findings),
         rounds: required_text(top, "rounds", rounds_help, findings),
-        params: param::read(top, findings),
-        records: records(top, findings),
+        records: records(top, &params, findings),
+        params,
         state: state(top, findings),
         streams: streams(top, findings),
         tallies: tallies(top, findings),
         layers: layers(top, findings),
+        stored: stored(top, findings),
         stages: stages(top, findings),
     }
 }
@@ -36,28 +41,39 @@ fn required_text(section: &Section<'_>, key: &str, help: &str, findings: &mut Fi
     item.and_then(|item| item.text(findings)).unwrap_or(Spanned { value: String::new(), span: nowhere })
 }
 
-fn records(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Record> {
+fn stored(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Spanned<String>> {
+    let mut stored = IndexMap::new();
+    for item in top.entries("stored", findings) {
+        name::check("stored value", &item, findings);
+        if let Some(field) = item.text(findings) {
+            stored.insert(item.name.to_owned(), field);
+        }
+    }
+    stored
+}
+
+fn records(top: &Section<'_>, params: &Params, findings: &mut Findings) -> IndexMap<String, Record> {
     let mut records = IndexMap::new();
     for item in top.entries("records", findings) {
         name::check("record", &item, findings);
-        let fields = item.section(findings).map(|section| fields(&section, findings)).unwrap_or_default();
+        let fields = item.section(findings).map(|section| fields(&section, params, findings)).unwrap_or_default();
         records.insert(item.name.to_owned(), Record { span: item.key, fields });
     }
     records
 }
 
-fn fields(section: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Field> {
+fn fields(section: &Section<'_>, params: &Params, findings: &mut Findings) -> IndexMap<String, Field> {
     let mut fields = IndexMap::new();
     for item in section.items() {
         name::check_part("field", item.name, item.key, findings);
-        let quantity = quantity(&item, findings).unwrap_or(Quantity::Index);
+        let quantity = quantity(&item, params, findings).unwrap_or(Quantity::Index);
         fields.insert(item.name.to_owned(), Field { span: item.key, quantity });
     }
     fields
 }
 
-/// `"position"`, or `{ quantity = "counter", bits = 8 }`.
-fn quantity(item: &Item<'_>, findings: &mut Findings) -> Option<Quantity> {
+/// `"position"`, `{ quantity = "counter", bits = 8 }`, or `max = "max_edges"` in the place of `bits`.
+fn quantity(item: &Item<'_>, params: &Params, findings: &mut Findings) -> Option<Quantity> {
     if !matches!(item.node.data, super::tree::Data::Table(_)) {
         return plain_quantity(item, findings);
     }
@@ -66,9 +82,8 @@ fn quantity(item: &Item<'_>, findings: &mut Findings) -> Option<Quantity> {
     let word_text = word.text(findings)?;
     match word_text.value.as_str() {
         "counter" => {
-            section.allow(&["quantity", "bits"], findings);
-            let bits = section.require("bits", "give its width: `bits = 8`", findings)?;
-            Some(Quantity::Counter { bits: bits.integer(1..=32, findings)? })
+            section.allow(&["quantity", "bits", "max"], findings);
+            counter(&section, params, findings)
         }
         "flags" => {
             section.allow(&["quantity", "names"], findings);
@@ -77,6 +92,22 @@ fn quantity(item: &Item<'_>, findings: &mut Findings) -> Option<Quantity> {
         _ => {
             section.allow(&["quantity"], findings);
             plain_quantity(&word, findings)
+        }
+    }
+}
+
+/// A width in bits, or the largest number as an expression over parameters.
+fn counter(section: &Section<'_>, params: &Params, findings: &mut Findings) -> Option<Quantity> {
+    let Some(max) = section.get("max") else {
+        let help = "give its width, `bits = 8`, or its largest number, `max = \"max_edges\"`";
+        let bits = section.require("bits", help, findings)?.integer(1..=32, findings)?;
+        return Some(Quantity::Counter { bits });
+    };
+    match expression::evaluate_max(params, &max.text(findings)?) {
+        Ok(largest) => Some(Quantity::Counter { bits: u32::BITS - largest.leading_zeros() }),
+        Err(diagnostic) => {
+            findings.push(diagnostic);
+            None
         }
     }
 }

@@ -68,6 +68,8 @@ pub struct LeafShape {
     pub ty: LeafType,
     /// Its width in bits: 32 a word, or fewer for counters and flags.
     pub bits: u32,
+    /// The word for what it is: the field's quantity, or of a hit's member its own.
+    pub quantity: &'static str,
 }
 
 impl Quantity {
@@ -86,6 +88,9 @@ impl Quantity {
         "counter",
         "flags",
     ];
+
+    /// The words that a codec may name: what can be kept in fewer bits.
+    pub const CODED: [&str; 6] = ["unit_vector", "spectrum", "pdf", "mis_partial", "weight", "uv"];
 
     /// The word that names the quantity in a config.
     pub fn name(&self) -> &'static str {
@@ -118,20 +123,25 @@ impl Quantity {
 
     /// The parts that are stored separately.
     pub fn leaves(&self) -> Vec<LeafShape> {
-        let whole = |ty: LeafType| vec![LeafShape { member: None, ty, bits: 32 * ty.words() }];
-        let member = |name, ty: LeafType| LeafShape { member: Some(name), ty, bits: 32 * ty.words() };
+        let quantity = self.name();
+        let whole = |ty: LeafType| vec![LeafShape { member: None, ty, bits: 32 * ty.words(), quantity }];
+        let member =
+            |name, ty: LeafType, quantity| LeafShape { member: Some(name), ty, bits: 32 * ty.words(), quantity };
+        let packed = |bits| vec![LeafShape { member: None, ty: LeafType::U32, bits, quantity }];
         match self {
             Quantity::Position | Quantity::UnitVector | Quantity::Spectrum => whole(LeafType::Vec3),
             Quantity::Pdf | Quantity::MisPartial | Quantity::Length | Quantity::Weight => whole(LeafType::Real),
             Quantity::Uv => whole(LeafType::Vec2),
             Quantity::Hit => {
-                vec![member("prim", LeafType::U32), member("t", LeafType::Real), member("uv", LeafType::Vec2)]
+                vec![
+                    member("prim", LeafType::U32, "index"),
+                    member("t", LeafType::Real, "length"),
+                    member("uv", LeafType::Vec2, "uv"),
+                ]
             }
             Quantity::Index => whole(LeafType::U32),
-            Quantity::Counter { bits } => vec![LeafShape { member: None, ty: LeafType::U32, bits: *bits }],
-            Quantity::Flags { names } => {
-                vec![LeafShape { member: None, ty: LeafType::U32, bits: names.len().max(1) as u32 }]
-            }
+            Quantity::Counter { bits } => packed(*bits),
+            Quantity::Flags { names } => packed(names.len().max(1) as u32),
         }
     }
 }

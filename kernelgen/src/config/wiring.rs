@@ -1,7 +1,8 @@
 //! Do the parts of a variant fit? Every name that one part says must exist in the other.
 
+use super::encode;
 use super::expression;
-use super::model::{Field, Layers, Layout, Pipeline, Placed, PlacedField, Tally, Variant};
+use super::model::{Field, Layers, Layout, OPTIONAL, Pipeline, Placed, PlacedField, Tally, Variant};
 use super::section::Findings;
 use super::suggest;
 use crate::diagnostic::Diagnostic;
@@ -26,6 +27,7 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
     }
     check_tables(&variant.layout, pipeline, findings);
     check_places(&variant.layout, pipeline, findings);
+    encode::check(variant, findings);
 }
 
 /// Instances and streams name records.
@@ -151,7 +153,7 @@ fn tally_functions(name: &str, tally: &Tally) -> [(String, Span); 3] {
 
 /// Layout tables name instances.
 fn check_tables(layout: &Layout, pipeline: &Pipeline, findings: &mut Findings) {
-    for instance in layout.tables.values().flatten() {
+    for instance in layout.tables.values().flatten().filter(|instance| !instance.value.ends_with(OPTIONAL)) {
         check_known(("K0401", "instance"), instance, &pipeline.state, findings);
     }
 }
@@ -174,7 +176,7 @@ fn fields(part: &Placed) -> &[PlacedField] {
 }
 
 /// `instance.field`, or `instance.field.member` of a hit.
-fn find_field(name: &str, span: Span, pipeline: &Pipeline) -> Result<(), Diagnostic> {
+pub(super) fn find_field(name: &str, span: Span, pipeline: &Pipeline) -> Result<(), Diagnostic> {
     let mut parts = name.splitn(3, '.');
     let instance = parts.next().unwrap_or_default();
     let Some(record) = pipeline.state.get(instance) else {

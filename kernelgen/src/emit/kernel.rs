@@ -50,6 +50,9 @@ pub(super) fn stage_kernel(
     for buffer in &access.buffers {
         imports.add("tables", [buffer.as_str(), format!("{buffer}_address").as_str()]);
     }
+    for (codec, function) in &access.codecs {
+        imports.add(&format!("codec::{codec}"), [function.as_str()]);
+    }
     let call = call(stage);
     let enqueue = enqueue(stage, queues, &mut imports);
     let mut text = String::new();

@@ -4,7 +4,7 @@ use super::text::COMPONENTS;
 use crate::analyze::{KernelTraffic, Leaf};
 use crate::config::model::Order;
 use crate::config::quantity::LeafType;
-use crate::layout::{Placement, Slot, StateLeaf, Table};
+use crate::layout::{Bits, Placement, Slot, Table};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -21,10 +21,11 @@ pub(super) fn module(placement: &Placement) -> String {
         let words = table.lanes * table.lane;
         let _ = write!(
             text,
-            "\n/// State of {}: {words} words a path, {}.\n\
+            "\n/// {} {}: {words} words a path, {}.\n\
              var<storage, read_write> {name}: array<{}>;\n\n\
              /// Where a lane of this path's record is.\n\
              fn {name}_address(lane: u32) -> u32 {{\n    return {};\n}}\n",
+            if table.rays { "Rays in flight of" } else { "State of" },
             table.instances.join(", "),
             describe(table.order),
             lane_type(table.lane),
@@ -70,14 +71,17 @@ pub(super) struct Access {
     pub store_bytes: u32,
     /// Buffers used: names of tables' variables.
     pub buffers: BTreeSet<String>,
+    /// Functions of codecs used: the codec's name, and the function's.
+    pub codecs: BTreeSet<(String, String)>,
 }
 
 /// The statements that move a kernel's leaves between tables and instances.
-pub(super) fn access(placement: &Placement, leaves: &BTreeMap<Leaf, StateLeaf>, traffic: &KernelTraffic) -> Access {
-    let memory = Memory { placement, leaves, traffic, words: words(placement) };
+pub(super) fn access(placement: &Placement, traffic: &KernelTraffic) -> Access {
+    let memory = Memory { placement, traffic, words: words(placement) };
     let mut access = Access::default();
     let loaded = memory.load_lanes(&mut access);
     memory.fill_leaves(&loaded, &mut access);
+    memory.encode_leaves(&mut access);
     memory.store_lanes(&loaded, &mut access);
     access
 }
@@ -90,26 +94,26 @@ type Lane = (usize, u32);
 /// A leaf's part of a word.
 struct Part<'a> {
     leaf: &'a Leaf,
-    slot: &'a Slot,
+    bits: Bits,
+    /// Which of its parts.
     component: usize,
 }
 
 fn words(placement: &Placement) -> BTreeMap<Word, Vec<Part<'_>>> {
     let mut words: BTreeMap<Word, Vec<Part<'_>>> = BTreeMap::new();
     for (leaf, slot) in &placement.slots {
-        for (component, &word) in slot.words.iter().enumerate() {
-            words.entry((slot.table, word)).or_default().push(Part { leaf, slot, component });
+        for (component, &bits) in slot.parts.iter().enumerate() {
+            words.entry((slot.table, bits.word)).or_default().push(Part { leaf, bits, component });
         }
     }
     for parts in words.values_mut() {
-        parts.sort_by_key(|part| part.slot.shift);
+        parts.sort_by_key(|part| part.bits.shift);
     }
     words
 }
 
 struct Memory<'a> {
     placement: &'a Placement,
-    leaves: &'a BTreeMap<Leaf, StateLeaf>,
     traffic: &'a KernelTraffic,
     words: BTreeMap<Word, Vec<Part<'a>>>,
 }
@@ -203,46 +207,57 @@ impl Memory<'_> {
             .traffic
             .loads
             .iter()
-            .filter_map(|leaf| Some((leaf, self.placement.slots.get(leaf)?, self.leaves.get(leaf)?)));
+            .filter_map(|leaf| Some((leaf, self.placement.slots.get(leaf)?, self.placement.leaves.get(leaf)?)));
         let mut placed: Vec<_> = placed.collect();
-        placed.sort_by(|(_, a, _), (_, b, _)| (a.table, &a.words, a.shift).cmp(&(b.table, &b.words, b.shift)));
+        placed.sort_by(|(_, a, _), (_, b, _)| (a.table, &a.parts).cmp(&(b.table, &b.parts)));
         for (leaf, slot, declared) in placed {
             let bits = self.register(slot, loaded);
-            let value = match declared.ty {
-                LeafType::U32 if slot.bits < 32 => {
-                    format!("extractBits({bits}, {}u, {}u)", slot.shift, slot.bits)
+            let value = match (&declared.codec, declared.ty) {
+                (Some(codec), _) => {
+                    let decode = format!("decode_{}", codec.name);
+                    access.codecs.insert((codec.name.clone(), decode.clone()));
+                    format!("{decode}({bits})")
                 }
-                LeafType::U32 => bits,
-                LeafType::Real => format!("bitcast<real>({bits})"),
-                LeafType::Vec2 => format!("bitcast<vec2r>({bits})"),
-                LeafType::Vec3 => format!("bitcast<vec3r>({bits})"),
+                (None, LeafType::U32) => bits,
+                (None, LeafType::Real) => format!("bitcast<real>({bits})"),
+                (None, LeafType::Vec2) => format!("bitcast<vec2r>({bits})"),
+                (None, LeafType::Vec3) => format!("bitcast<vec3r>({bits})"),
             };
             access.loads.push(format!("{leaf} = {value};"));
         }
     }
 
-    /// The words of a slot as one value: a swizzle where they stand side by side in one lane.
+    /// The parts of a slot as one value: a swizzle where they are words side by side in one lane.
     fn register(&self, slot: &Slot, loaded: &Loaded) -> String {
-        let lanes: Vec<(Lane, usize)> = slot.words.iter().map(|&word| self.lane_of((slot.table, word))).collect();
+        let lanes: Vec<(Lane, usize)> = slot.parts.iter().map(|part| self.lane_of((slot.table, part.word))).collect();
         let (lane, first) = lanes[0];
         let together = lanes.iter().enumerate().all(|(step, place)| *place == (lane, first + step));
+        let whole = slot.parts.iter().all(|part| part.bits == 32);
         match loaded.whole.get(&lane) {
-            Some(local) if together && lanes.len() > 1 => {
+            Some(local) if together && whole && lanes.len() > 1 => {
                 let all = lanes.len() as u32 == self.table(slot.table).lane;
                 let swizzle = COMPONENTS[first..first + lanes.len()].concat();
                 if all { local.clone() } else { format!("{local}.{swizzle}") }
             }
             _ => {
-                let names: Vec<&str> = slot
-                    .words
-                    .iter()
-                    .map(|&word| loaded.words.get(&(slot.table, word)).map_or("", String::as_str))
-                    .collect();
-                match names.as_slice() {
-                    [name] => (*name).to_owned(),
-                    _ => format!("vec{}u({})", names.len(), names.join(", ")),
+                let values: Vec<String> = slot.parts.iter().map(|part| part_value(slot.table, part, loaded)).collect();
+                match values.as_slice() {
+                    [value] => value.clone(),
+                    _ => format!("vec{}u({})", values.len(), values.join(", ")),
                 }
             }
+        }
+    }
+
+    /// Locals for what codecs make of the leaves that are stored.
+    fn encode_leaves(&self, access: &mut Access) {
+        for leaf in self.traffic.stores.iter().filter(|leaf| self.placement.slots.contains_key(*leaf)) {
+            let Some(codec) = self.placement.leaves.get(leaf).and_then(|declared| declared.codec.as_ref()) else {
+                continue;
+            };
+            let encode = format!("encode_{}", codec.name);
+            access.stores.push(format!("let {} = {encode}({leaf});", encoded(leaf)));
+            access.codecs.insert((codec.name.clone(), encode));
         }
     }
 
@@ -294,24 +309,29 @@ impl Memory<'_> {
         let mut value = old.to_owned();
         for part in parts.iter().filter(|part| self.traffic.stores.contains(part.leaf)) {
             let bits = self.bits_of(part);
-            value = if part.slot.bits == 32 {
+            value = if part.bits.bits == 32 {
                 bits
             } else {
-                format!("insertBits({value}, {bits}, {}u, {}u)", part.slot.shift, part.slot.bits)
+                format!("insertBits({value}, {bits}, {}u, {}u)", part.bits.shift, part.bits.bits)
             };
         }
         WordStore::Value(value)
     }
 
-    /// A component of a leaf as a word.
+    /// A part of a leaf as a word.
     fn bits_of(&self, part: &Part<'_>) -> String {
         let leaf = part.leaf;
-        match self.leaves.get(leaf).map(|declared| declared.ty) {
-            Some(LeafType::Real) => format!("bitcast<u32>({leaf})"),
-            Some(LeafType::Vec2 | LeafType::Vec3) => {
-                format!("bitcast<u32>({leaf}.{})", COMPONENTS[part.component])
-            }
-            _ => leaf.to_string(),
+        let Some(declared) = self.placement.leaves.get(leaf) else { return leaf.to_string() };
+        if let Some(codec) = &declared.codec {
+            return match codec.parts.len() {
+                1 => encoded(leaf),
+                _ => format!("{}.{}", encoded(leaf), COMPONENTS[part.component]),
+            };
+        }
+        match declared.ty {
+            LeafType::U32 => leaf.to_string(),
+            LeafType::Real => format!("bitcast<u32>({leaf})"),
+            LeafType::Vec2 | LeafType::Vec3 => format!("bitcast<u32>({leaf}.{})", COMPONENTS[part.component]),
         }
     }
 
@@ -336,12 +356,29 @@ impl Memory<'_> {
         }
     }
 
-    /// The vector leaf whose words are this one and those right behind it, at most `room`.
+    /// The stored vector leaf whose words are this one and those right behind it, at most `room`.
     fn whole_vector(&self, word: Word, room: usize) -> Option<(&Leaf, usize)> {
-        let [part] = self.words.get(&word)?.as_slice() else { return None };
-        let words = &part.slot.words;
-        let together = words.iter().zip(word.1..).all(|(&own, expected)| own == expected);
+        let parts = self.words.get(&word)?;
+        let [part] = parts.iter().filter(|part| self.traffic.stores.contains(part.leaf)).collect::<Vec<_>>()[..] else {
+            return None;
+        };
+        if self.placement.leaves.get(part.leaf)?.codec.is_some() {
+            return None;
+        }
+        let words = &self.placement.slots.get(part.leaf)?.parts;
+        let together = words.iter().zip(word.1..).all(|(own, expected)| own.word == expected);
         let fits = part.component == 0 && words.len() > 1 && words.len() <= room;
         (fits && together).then_some((part.leaf, words.len()))
     }
+}
+
+/// A part of a leaf, out of the word that holds it.
+fn part_value(table: usize, part: &Bits, loaded: &Loaded) -> String {
+    let word = loaded.words.get(&(table, part.word)).map_or("", String::as_str);
+    if part.bits == 32 { word.to_owned() } else { format!("extractBits({word}, {}u, {}u)", part.shift, part.bits) }
+}
+
+/// The local that holds what a codec made of a leaf.
+fn encoded(leaf: &Leaf) -> String {
+    format!("{}_bits", leaf.to_string().replace('.', "_"))
 }

@@ -10,6 +10,7 @@ mod program;
 mod queue;
 mod room;
 mod signature;
+mod stored;
 mod stream;
 mod tally;
 #[cfg(test)]
@@ -22,7 +23,7 @@ use crate::config;
 use crate::config::evaluate_rounds;
 use crate::config::model::{PathOrder, Selection, Variant};
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::layout::{self, Placement, StateLeaf};
+use crate::layout::{self, Placement};
 use crate::link::Modules;
 use crate::plan::{Layers, Plan, Tally};
 use crate::report::{self, Report};
@@ -72,13 +73,11 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     let layers = film::used(layers, &wiring.splats);
     add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues);
     add_module(sources, &mut modules, "film", film::module(variant.schedule.accumulate, &layers));
-    let leaves = leaves(&variant);
     let program = Program {
         variant: &variant,
         wiring: &wiring,
         liveness: &liveness,
         placement: &placement,
-        leaves: &leaves,
         queues: &queues,
         constants: &constants,
         rounds,
@@ -136,6 +135,7 @@ fn add_config_modules(
         ("control", queue::control_module(&queues)),
         ("film", film::module(variant.schedule.accumulate, layers)),
         ("streams", stream::analysis_module(pipeline)),
+        ("stored", stored::module(pipeline, &BTreeMap::new())),
         ("tallies", tally::module(pipeline, tallies, variant.schedule.workgroup.value)),
     ];
     for (name, text) in texts {
@@ -171,6 +171,7 @@ fn add_state_modules(
         ("control", queue::control_module(queues)),
         ("queue", queue::queue_module(queues, kind)),
         ("tables", memory::module(placement)),
+        ("stored", stored::module(&variant.pipeline, &placement.leaves)),
         ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule))),
     ];
     for (name, text) in texts {
@@ -188,11 +189,6 @@ fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
         streams: batched.map(|(name, _)| name.clone()).collect(),
         workgroup: variant.schedule.workgroup.value,
     }
-}
-
-fn leaves(variant: &Variant) -> BTreeMap<Leaf, StateLeaf> {
-    let leaves = layout::state_leaves(&variant.pipeline).into_iter();
-    leaves.map(|leaf| (leaf.leaf.clone(), leaf)).collect()
 }
 
 /// K0210: a leaf that some stage reads although no stage before it surely wrote it.

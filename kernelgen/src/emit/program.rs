@@ -8,15 +8,15 @@ use super::room;
 use super::stream;
 use super::tally;
 use super::wiring::Wiring;
-use crate::analyze::{self, Leaf, Liveness};
+use crate::analyze::{self, Liveness};
 use crate::config::model::{Accumulate, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
-use crate::layout::{Placement, StateLeaf};
+use crate::layout::Placement;
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
 use crate::plan::{self, Binding, Buffer, Counter, Kernel, Layers, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexMap;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// What the program is built from.
 pub(super) struct Program<'a> {
@@ -24,7 +24,6 @@ pub(super) struct Program<'a> {
     pub wiring: &'a Wiring,
     pub liveness: &'a Liveness,
     pub placement: &'a Placement,
-    pub leaves: &'a BTreeMap<Leaf, StateLeaf>,
     pub queues: &'a Queues,
     pub constants: &'a Constants,
     pub rounds: u32,
@@ -197,7 +196,7 @@ impl Builder<'_> {
         let program = self.program;
         let stage = &program.wiring.stages[name];
         let access = match program.liveness.kernels.get(name) {
-            Some(traffic) => memory::access(program.placement, program.leaves, traffic),
+            Some(traffic) => memory::access(program.placement, traffic),
             None => Access::default(),
         };
         let starts_again = source == Source::Slots && program.wiring.is_looped(name);
@@ -302,6 +301,7 @@ impl Builder<'_> {
             layers: self.program.layers.to_vec(),
             film: self.program.variant.schedule.accumulate,
             bytes_per_path: placement.bytes_per_path(),
+            ray_bytes_per_path: placement.ray_bytes_per_path(),
             slots_per_grain: room::slots(self.program.wiring, &self.program.variant.schedule),
             needs,
             buffers: buffers.into_values().collect(),

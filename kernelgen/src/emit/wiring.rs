@@ -85,7 +85,8 @@ impl Wiring {
     pub(super) fn flow(&self, start: &str) -> Flow {
         let stage = |(name, stage): (&String, &WiredStage)| {
             let next: IndexSet<String> = stage.routes.iter().map(|(_, target)| target.clone()).collect();
-            let flow = FlowStage { facts: stage.facts.clone(), next: next.into_iter().collect() };
+            let traces = stage.rays == Some(RayKind::Walk);
+            let flow = FlowStage { facts: stage.facts.clone(), next: next.into_iter().collect(), traces };
             (name.clone(), flow)
         };
         Flow { stages: self.stages.iter().map(stage).collect(), start: start.to_owned() }
@@ -406,6 +407,8 @@ fn read_leaves(variant: &Variant, name: &str, stream: &Stream, facts: &StageFact
             leaf: Leaf { instance: name.to_owned(), field: field.clone(), member: shape.member.map(str::to_owned) },
             ty: shape.ty,
             bits: shape.bits,
+            quantity: shape.quantity,
+            codec: None,
         })
     });
     leaves.filter(|leaf| facts.reads.contains_key(&leaf.leaf)).collect()

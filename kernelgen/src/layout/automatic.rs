@@ -1,88 +1,202 @@
 //! Packing without a plan of the user's: as few lanes as possible, vectors whole where that costs no lane, and together what the
-//! same kernels read and write.
+//! same kernels read and write. Where the layout shares, bits go to several leaves that never live together.
 
-use super::{Placement, Slot, StateLeaf, Table};
+use super::interference::interfere;
+use super::{Assigned, Bits, Slot, StateLeaf, Table};
 use crate::analyze::{Leaf, Liveness};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// A part of the record that needs consecutive words in one lane.
-struct Piece {
-    words: u32,
-    /// The leaf and the component its first word holds; leaves below a word share pieces of one word.
-    holds: Vec<Held>,
-}
-
-struct Held {
-    leaf: usize,
-    component: usize,
-    shift: u32,
+/// Packs the leaves of each table; leaves of instances without a table are left out.
+pub(super) fn assign(mut tables: Vec<Table>, leaves: &[StateLeaf], liveness: &Liveness, share: bool) -> Assigned {
+    let rays_apart = tables.iter().any(|table| table.rays);
+    let mut slots = BTreeMap::new();
+    for (index, table) in tables.iter_mut().enumerate() {
+        let is_own = |leaf: &&StateLeaf| {
+            let apart = rays_apart && liveness.in_flight.contains(&leaf.leaf);
+            apart == table.rays && table.instances.contains(&leaf.leaf.instance)
+        };
+        let own: Vec<&StateLeaf> = leaves.iter().filter(is_own).collect();
+        let packer = Packer::new(&own, table.lane, liveness, share);
+        let lanes = packer.pack();
+        table.lanes = lanes.len() as u32;
+        slots.extend(packer.slots(index, &lanes));
+    }
+    (tables, slots)
 }
 
 /// Which kernels load and store something: one entry a kernel and direction.
 type Access = Vec<bool>;
 
-/// Packs the leaves of each table; leaves of instances without a table are left out.
-pub(super) fn assign(mut tables: Vec<Table>, leaves: &[StateLeaf], liveness: &Liveness) -> Placement {
-    let mut slots = BTreeMap::new();
-    for (index, table) in tables.iter_mut().enumerate() {
-        let own: Vec<&StateLeaf> = leaves.iter().filter(|leaf| table.instances.contains(&leaf.leaf.instance)).collect();
-        let (lanes, packed) = pack(&own, table.lane, liveness);
-        table.lanes = lanes;
-        slots.extend(packed.into_iter().map(|(leaf, slot)| (leaf, Slot { table: index, ..slot })));
-    }
-    Placement { tables, slots }
+/// Parts of a leaf that go side by side into one lane: whole words, or one part below a word.
+#[derive(Clone, Copy)]
+struct Piece {
+    leaf: usize,
+    /// The first of them.
+    part: usize,
+    words: u32,
+    /// Of a word; 32 for whole words.
+    bits: u32,
 }
 
-/// Packs into as few lanes as the words need; the last vectors are split when keeping them whole would cost a lane.
-fn pack(leaves: &[&StateLeaf], lane: u32, liveness: &Liveness) -> (u32, Vec<(Leaf, Slot)>) {
-    let accesses: Vec<Access> = leaves.iter().map(|leaf| access(&leaf.leaf, liveness)).collect();
-    let vectors = leaves.iter().filter(|leaf| leaf.ty.words() > 1).count();
-    let words: u32 = pieces(leaves, lane, 0).iter().map(|piece| piece.words).sum();
-    let fewest = words.div_ceil(lane);
-    let mut kept = vectors;
-    loop {
-        let pieces = pieces(leaves, lane, kept);
-        let (lanes, starts) = fit(&pieces, &accesses, lane);
-        if lanes == fewest || kept == 0 {
-            return (lanes, slots(leaves, &pieces, &starts));
+/// What a word holds of a piece.
+#[derive(Clone, Copy)]
+struct Held {
+    leaf: usize,
+    part: usize,
+    shift: u32,
+    bits: u32,
+}
+
+/// A lane while it is filled.
+#[derive(Clone)]
+struct Lane {
+    words: Vec<Vec<Held>>,
+    access: Access,
+}
+
+/// Where a piece may go.
+struct Candidate {
+    lane: usize,
+    word: usize,
+    shift: u32,
+}
+
+struct Packer<'a> {
+    leaves: &'a [&'a StateLeaf],
+    lane: u32,
+    share: bool,
+    accesses: Vec<Access>,
+    /// For every two leaves: whether they cannot have a bit in common.
+    conflicts: Vec<Vec<bool>>,
+}
+
+impl<'a> Packer<'a> {
+    fn new(leaves: &'a [&'a StateLeaf], lane: u32, liveness: &Liveness, share: bool) -> Self {
+        let conflict = |a: &&StateLeaf, b: &&StateLeaf| !share || a == b || interfere(&a.leaf, &b.leaf, liveness);
+        let conflicts = leaves.iter().map(|a| leaves.iter().map(|b| conflict(a, b)).collect()).collect();
+        Packer {
+            leaves,
+            lane,
+            share,
+            accesses: leaves.iter().map(|leaf| access(&leaf.leaf, liveness)).collect(),
+            conflicts,
         }
-        kept -= 1;
+    }
+
+    /// The fewest lanes that any way of packing found; among equals the one that splits the fewest vectors.
+    fn pack(&self) -> Vec<Lane> {
+        let vectors = self.leaves.iter().filter(|leaf| is_vector(leaf)).count();
+        let mut best: Option<Vec<Lane>> = None;
+        for kept in (0..=vectors).rev() {
+            for order in self.orders(&self.pieces(kept)) {
+                let lanes = self.fit(&order);
+                if best.as_ref().is_none_or(|best| lanes.len() < best.len()) {
+                    best = Some(lanes);
+                }
+            }
+        }
+        best.unwrap_or_default()
+    }
+
+    /// Cuts leaves into pieces, in order of declaration: the first `kept` vectors as large as a lane allows, the others word by word.
+    fn pieces(&self, kept: usize) -> Vec<Piece> {
+        let mut pieces = Vec::new();
+        let mut vectors = 0;
+        for (index, leaf) in self.leaves.iter().enumerate() {
+            vectors += usize::from(is_vector(leaf));
+            let largest = if is_vector(leaf) && vectors <= kept { self.lane } else { 1 };
+            let parts = leaf.parts();
+            let mut part = 0;
+            while part < parts.len() {
+                let whole = parts[part..].iter().take_while(|&&bits| bits == 32).count() as u32;
+                let words = largest.min(whole).max(1);
+                pieces.push(Piece { leaf: index, part, words, bits: parts[part] });
+                part += words as usize;
+            }
+        }
+        pieces
+    }
+
+    /// Orders in which to place the pieces, large ones first. What many others conflict with finds room most easily at the start.
+    fn orders(&self, pieces: &[Piece]) -> Vec<Vec<Piece>> {
+        let mut by_size = pieces.to_vec();
+        by_size.sort_by_key(|piece| Reverse(piece.words));
+        if !self.share {
+            return vec![by_size];
+        }
+        let crowd = |piece: &Piece| self.conflicts[piece.leaf].iter().filter(|conflict| **conflict).count();
+        let mut by_crowd = pieces.to_vec();
+        by_crowd.sort_by_key(|piece| Reverse((piece.words, piece.bits, crowd(piece))));
+        let mut crowd_first = pieces.to_vec();
+        crowd_first.sort_by_key(|piece| (piece.bits < 32, Reverse(crowd(piece)), Reverse((piece.words, piece.bits))));
+        vec![by_size, by_crowd, crowd_first]
+    }
+
+    /// Places the pieces in turn, each where it takes the fewest new words, and there where its kernels access the lane anyway.
+    fn fit(&self, pieces: &[Piece]) -> Vec<Lane> {
+        let mut lanes: Vec<Lane> = Vec::new();
+        for piece in pieces {
+            let candidates = lanes.iter().enumerate().flat_map(|(index, lane)| self.candidates(index, lane, piece));
+            let cost = |candidate: &Candidate| {
+                let lane = &lanes[candidate.lane];
+                let words = &lane.words[candidate.word..candidate.word + piece.words as usize];
+                let new = words.iter().filter(|held| held.is_empty()).count();
+                (new, added(&self.accesses[piece.leaf], &lane.access))
+            };
+            let found = candidates.min_by_key(cost).unwrap_or_else(|| {
+                let access = vec![false; self.accesses[piece.leaf].len()];
+                lanes.push(Lane { words: vec![Vec::new(); self.lane as usize], access });
+                Candidate { lane: lanes.len() - 1, word: 0, shift: 0 }
+            });
+            let lane = &mut lanes[found.lane];
+            for word in 0..piece.words as usize {
+                let held = Held { leaf: piece.leaf, part: piece.part + word, shift: found.shift, bits: piece.bits };
+                lane.words[found.word + word].push(held);
+            }
+            merge(&mut lane.access, &self.accesses[piece.leaf]);
+        }
+        lanes
+    }
+
+    /// The places in a lane that have room for a piece: the first shift of each word.
+    fn candidates(&self, index: usize, lane: &Lane, piece: &Piece) -> Vec<Candidate> {
+        let last = (self.lane - piece.words) as usize;
+        let room = |word: usize| {
+            let words = &lane.words[word..word + piece.words as usize];
+            let mut shifts: Vec<u32> = words[0].iter().map(|held| held.shift + held.bits).collect();
+            shifts.push(0);
+            shifts.sort_unstable();
+            let shift = shifts
+                .into_iter()
+                .find(|&shift| shift + piece.bits <= 32 && words.iter().all(|word| self.fits(word, piece, shift)))?;
+            Some(Candidate { lane: index, word, shift })
+        };
+        (0..=last).filter_map(room).collect()
+    }
+
+    fn fits(&self, word: &[Held], piece: &Piece, shift: u32) -> bool {
+        let overlaps = |held: &&Held| held.shift < shift + piece.bits && shift < held.shift + held.bits;
+        !word.iter().filter(overlaps).any(|held| self.conflicts[piece.leaf][held.leaf])
+    }
+
+    fn slots(&self, table: usize, lanes: &[Lane]) -> BTreeMap<Leaf, Slot> {
+        let nowhere = Bits { word: 0, shift: 0, bits: 0 };
+        let mut parts: Vec<Vec<Bits>> = self.leaves.iter().map(|leaf| vec![nowhere; leaf.parts().len()]).collect();
+        for (held, word) in lanes.iter().flat_map(|lane| &lane.words).zip(0..) {
+            for held in held {
+                parts[held.leaf][held.part] = Bits { word, shift: held.shift, bits: held.bits };
+            }
+        }
+        let slot = |(leaf, parts): (&&StateLeaf, Vec<Bits>)| (leaf.leaf.clone(), Slot { table, parts });
+        self.leaves.iter().zip(parts).map(slot).collect()
     }
 }
 
-/// Cuts leaves into pieces, in order of declaration: the first `kept` vectors as large as a lane allows, the others word by word.
-fn pieces(leaves: &[&StateLeaf], lane: u32, kept: usize) -> Vec<Piece> {
-    let mut pieces = Vec::new();
-    let mut shared: Vec<(usize, u32)> = Vec::new();
-    let mut vectors = 0;
-    for (index, leaf) in leaves.iter().enumerate() {
-        if leaf.bits < 32 {
-            hold_bits(&mut pieces, &mut shared, index, leaf.bits);
-            continue;
-        }
-        let words = leaf.ty.words();
-        vectors += usize::from(words > 1);
-        let largest = if words > 1 && vectors <= kept { lane } else { 1 };
-        let mut component = 0;
-        while component < words {
-            let size = largest.min(words - component);
-            let held = Held { leaf: index, component: component as usize, shift: 0 };
-            pieces.push(Piece { words: size, holds: vec![held] });
-            component += size;
-        }
-    }
-    pieces
-}
-
-/// Puts a leaf below a word into the first shared word with room, or opens one.
-fn hold_bits(pieces: &mut Vec<Piece>, shared: &mut Vec<(usize, u32)>, leaf: usize, bits: u32) {
-    if let Some((piece, used)) = shared.iter_mut().find(|(_, used)| used.saturating_add(bits) <= 32) {
-        pieces[*piece].holds.push(Held { leaf, component: 0, shift: *used });
-        *used += bits;
-    } else {
-        shared.push((pieces.len(), bits));
-        pieces.push(Piece { words: 1, holds: vec![Held { leaf, component: 0, shift: 0 }] });
-    }
+/// Whether it is stored in several whole words.
+fn is_vector(leaf: &StateLeaf) -> bool {
+    let parts = leaf.parts();
+    parts.len() > 1 && parts.iter().all(|&bits| bits == 32)
 }
 
 fn access(leaf: &Leaf, liveness: &Liveness) -> Access {
@@ -90,65 +204,13 @@ fn access(leaf: &Leaf, liveness: &Liveness) -> Access {
     kernels.flat_map(|kernel| [kernel.loads.contains(leaf), kernel.stores.contains(leaf)]).collect()
 }
 
-/// A lane while it is filled.
-struct Lane {
-    used: u32,
-    access: Access,
-}
-
-impl Lane {
-    /// Loads and stores of this lane that a piece would add.
-    fn added(&self, piece: &Access) -> usize {
-        piece.iter().zip(&self.access).filter(|(piece, lane)| **piece && !**lane).count()
-    }
-}
-
-/// First word of every piece: large pieces first, each into the lane with room whose kernels access it anyway.
-fn fit(pieces: &[Piece], accesses: &[Access], lane: u32) -> (u32, Vec<u32>) {
-    let mut order: Vec<usize> = (0..pieces.len()).collect();
-    order.sort_by_key(|&piece| std::cmp::Reverse(pieces[piece].words));
-    let mut lanes: Vec<Lane> = Vec::new();
-    let mut starts = vec![0; pieces.len()];
-    for piece in order {
-        let words = pieces[piece].words;
-        let mut own = vec![false; accesses.first().map_or(0, Vec::len)];
-        for held in &pieces[piece].holds {
-            merge(&mut own, &accesses[held.leaf]);
-        }
-        let roomy = (0..lanes.len()).filter(|&index| lanes[index].used + words <= lane);
-        let found = roomy.min_by_key(|&index| lanes[index].added(&own)).unwrap_or_else(|| {
-            lanes.push(Lane { used: 0, access: vec![false; own.len()] });
-            lanes.len() - 1
-        });
-        starts[piece] = found as u32 * lane + lanes[found].used;
-        lanes[found].used += words;
-        merge(&mut lanes[found].access, &own);
-    }
-    (lanes.len() as u32, starts)
+/// Loads and stores of a lane that a piece would add.
+fn added(piece: &Access, lane: &Access) -> usize {
+    piece.iter().zip(lane).filter(|(piece, lane)| **piece && !**lane).count()
 }
 
 fn merge(access: &mut Access, other: &Access) {
     for (mine, theirs) in access.iter_mut().zip(other) {
         *mine |= theirs;
     }
-}
-
-fn slots(leaves: &[&StateLeaf], pieces: &[Piece], starts: &[u32]) -> Vec<(Leaf, Slot)> {
-    let empty = |leaf: &&StateLeaf| Slot {
-        table: 0,
-        words: vec![0; leaf.ty.words() as usize],
-        shift: 0,
-        bits: leaf.bits.min(32),
-    };
-    let mut slots: Vec<Slot> = leaves.iter().map(empty).collect();
-    for (piece, start) in pieces.iter().zip(starts) {
-        for held in &piece.holds {
-            let slot = &mut slots[held.leaf];
-            slot.shift = held.shift;
-            for word in 0..piece.words {
-                slot.words[held.component + word as usize] = start + word;
-            }
-        }
-    }
-    leaves.iter().map(|leaf| leaf.leaf.clone()).zip(slots).collect()
 }

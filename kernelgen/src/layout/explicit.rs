@@ -1,6 +1,6 @@
 //! Placement by rows: the user says which field fills which word, and every word is accounted for.
 
-use super::{Placement, Slot, StateLeaf, Table};
+use super::{Assigned, Bits, Slot, StateLeaf, Table};
 use crate::analyze::Leaf;
 use crate::config::model::{Layout, Placed, PlacedField, PlacedRow};
 use crate::config::nearest;
@@ -14,27 +14,23 @@ pub(super) fn assign(
     layout: &Layout,
     all: &[StateLeaf],
     needed: &[StateLeaf],
-) -> Result<Placement, Vec<Diagnostic>> {
-    let mut rows = Rows {
-        all,
-        lane: layout.lane,
-        placement: Placement { tables, slots: BTreeMap::new() },
-        places: BTreeMap::new(),
-        findings: Vec::new(),
-    };
+) -> Result<Assigned, Vec<Diagnostic>> {
+    let mut rows =
+        Rows { all, lane: layout.lane, tables, slots: BTreeMap::new(), places: BTreeMap::new(), findings: Vec::new() };
     let mut table = 0;
     for row in &layout.place {
         table = rows.table_of(row).unwrap_or(table);
         rows.read(row, table);
     }
     rows.check_missing(layout, needed);
-    if rows.findings.is_empty() { Ok(rows.placement) } else { Err(rows.findings) }
+    if rows.findings.is_empty() { Ok((rows.tables, rows.slots)) } else { Err(rows.findings) }
 }
 
 struct Rows<'a> {
     all: &'a [StateLeaf],
     lane: u32,
-    placement: Placement,
+    tables: Vec<Table>,
+    slots: BTreeMap<Leaf, Slot>,
     places: BTreeMap<Leaf, Span>,
     findings: Vec<Diagnostic>,
 }
@@ -47,7 +43,7 @@ impl Rows<'_> {
             let Some(table) = self.table_of_field(field) else { continue };
             match first {
                 Some((other, before)) if other != table => {
-                    let tables = &self.placement.tables;
+                    let tables = &self.tables;
                     let message =
                         format!("a row cannot mix the tables `{}` and `{}`", tables[other].name, tables[table].name);
                     self.findings.push(
@@ -67,12 +63,12 @@ impl Rows<'_> {
 
     fn table_of_field(&self, field: &PlacedField) -> Option<usize> {
         let instance = field.field.as_ref()?.split('.').next()?;
-        let tables = &self.placement.tables;
+        let tables = &self.tables;
         tables.iter().position(|table| table.instances.iter().any(|name| name == instance))
     }
 
     fn read(&mut self, row: &PlacedRow, table: usize) {
-        let first = self.placement.tables[table].lanes * self.lane;
+        let first = self.tables[table].lanes * self.lane;
         let mut word = first;
         for part in &row.parts {
             word += match part {
@@ -80,7 +76,7 @@ impl Rows<'_> {
                 Placed::Bits(fields) => self.place_bits(row, fields, table, word),
             };
         }
-        self.placement.tables[table].lanes += 1;
+        self.tables[table].lanes += 1;
         self.check_width(row, word - first);
     }
 
@@ -125,7 +121,8 @@ impl Rows<'_> {
         let mut word = first;
         for leaf in leaves {
             let next = word + leaf.ty.words();
-            let slot = Slot { table, words: (word..next).collect(), shift: 0, bits: 32 };
+            let parts = (word..next).map(|word| Bits { word, shift: 0, bits: 32 });
+            let slot = Slot { table, parts: parts.collect() };
             self.put(leaf.leaf, slot, field.span);
             word = next;
         }
@@ -183,7 +180,7 @@ impl Rows<'_> {
                 .help(format!("write \"{name}:{}\"", leaf.bits));
             self.findings.push(finding);
         }
-        let slot = Slot { table, words: vec![word], shift, bits: width.min(32) };
+        let slot = Slot { table, parts: vec![Bits { word, shift, bits: width.min(32) }] };
         self.put(leaf.leaf.clone(), slot, field.span);
         width
     }
@@ -203,7 +200,7 @@ impl Rows<'_> {
                 .help("put \"_\" in place of one of them");
             self.findings.push(finding);
         }
-        self.placement.slots.insert(leaf, slot);
+        self.slots.insert(leaf, slot);
     }
 
     /// The leaves that `instance.field` or `instance.field.member` stands for.

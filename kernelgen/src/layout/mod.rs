@@ -3,15 +3,18 @@
 //! A path's record in a table is a row of 32-bit words, cut into lanes of 1, 2 or 4 words; a lane is what one access reads or writes.
 
 mod automatic;
+mod codec;
 mod explicit;
+mod interference;
 #[cfg(test)]
 mod tests;
 
 use crate::analyze::{Leaf, Liveness};
-use crate::config::model::{Layout, Order, Pipeline, Variant};
+use crate::config::model::{Codec, Layout, OPTIONAL, Order, Pipeline, Variant};
 use crate::config::nearest;
 use crate::config::quantity::LeafType;
 use crate::diagnostic::Diagnostic;
+use crate::source::Spanned;
 use indexmap::IndexMap;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,6 +25,8 @@ pub struct Placement {
     pub tables: Vec<Table>,
     /// Leaf to place.
     pub slots: BTreeMap<Leaf, Slot>,
+    /// All leaves of the state, stored or not, with their codecs.
+    pub leaves: BTreeMap<Leaf, StateLeaf>,
 }
 
 /// A table of path state: one buffer.
@@ -37,6 +42,8 @@ pub struct Table {
     pub lane: u32,
     /// Lanes a path.
     pub lanes: u32,
+    /// Whether it holds the leaves in flight (see `Liveness::in_flight`), of all instances, and nothing else.
+    pub rays: bool,
 }
 
 /// The place of a leaf in its table.
@@ -44,29 +51,76 @@ pub struct Table {
 pub struct Slot {
     /// Index into `Placement::tables`.
     pub table: usize,
-    /// Word of the path's record for each component.
-    pub words: Vec<u32>,
-    /// Lowest bit in the word; 0 for whole words.
+    /// The place of each of its parts, see `StateLeaf::parts`.
+    pub parts: Vec<Bits>,
+}
+
+/// Neighbouring bits of a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Bits {
+    /// Word of the path's record.
+    pub word: u32,
+    /// Lowest bit in it; 0 for whole words.
     pub shift: u32,
-    /// Bits of the word that belong to it; 32 for whole words.
+    /// How many; 32 for whole words.
     pub bits: u32,
 }
 
 /// A leaf of the pipeline's state with its type.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct StateLeaf {
     /// Instance, field, member.
     pub leaf: Leaf,
     /// Its WGSL type.
     pub ty: LeafType,
-    /// Its width in bits; below 32 it may share a word.
+    /// Its width in bits as it is computed; below 32 it may share a word.
     pub bits: u32,
+    /// The word for what it is: `spectrum`.
+    pub quantity: &'static str,
+    /// How it is kept; `None`: as it is computed.
+    pub codec: Option<Codec>,
+}
+
+impl StateLeaf {
+    /// Widths in bits of the parts that it is stored in, each within a word: those of its codec, or its components.
+    pub fn parts(&self) -> Vec<u32> {
+        match &self.codec {
+            Some(codec) => codec.parts.clone(),
+            None => vec![self.bits.min(32); self.ty.words() as usize],
+        }
+    }
+}
+
+impl Slot {
+    /// Whether some bit belongs to both.
+    pub fn overlaps(&self, other: &Slot) -> bool {
+        self.table == other.table && self.parts.iter().any(|part| other.parts.iter().any(|bits| part.overlaps(bits)))
+    }
+}
+
+impl Bits {
+    /// Whether some bit belongs to both.
+    pub fn overlaps(&self, other: &Bits) -> bool {
+        self.word == other.word && self.shift < other.shift + other.bits && other.shift < self.shift + self.bits
+    }
 }
 
 impl Placement {
-    /// Bytes of state a path takes, all tables.
+    /// Bytes of state a path takes, the table of rays in flight left out.
     pub fn bytes_per_path(&self) -> u32 {
-        self.tables.iter().map(Table::bytes_per_path).sum()
+        self.tables.iter().filter(|table| !table.rays).map(Table::bytes_per_path).sum()
+    }
+
+    /// Bytes a path takes in the table of rays in flight.
+    pub fn ray_bytes_per_path(&self) -> u32 {
+        self.tables.iter().filter(|table| table.rays).map(Table::bytes_per_path).sum()
+    }
+
+    /// Stored leaves that have bits in common with this one.
+    pub fn shares(&self, leaf: &Leaf) -> Vec<&Leaf> {
+        let Some(own) = self.slots.get(leaf) else { return Vec::new() };
+        let others = self.slots.iter().filter(|(other, slot)| *other != leaf && slot.overlaps(own));
+        others.map(|(other, _)| other).collect()
     }
 }
 
@@ -106,6 +160,8 @@ pub fn state_leaves(pipeline: &Pipeline) -> Vec<StateLeaf> {
                 },
                 ty: shape.ty,
                 bits: shape.bits,
+                quantity: shape.quantity,
+                codec: None,
             }));
         }
     }
@@ -120,16 +176,25 @@ pub fn state_leaves(pipeline: &Pipeline) -> Vec<StateLeaf> {
 /// K0408 a row whose fields belong to different tables, K0409 an instance that no table lists.
 pub fn assign(variant: &Variant, liveness: &Liveness) -> Result<Placement, Vec<Diagnostic>> {
     let (pipeline, layout) = (&variant.pipeline, &variant.layout);
-    let all = state_leaves(pipeline);
+    let mut all = state_leaves(pipeline);
+    codec::choose(&mut all, layout, liveness, &variant.codecs);
     let needed: Vec<StateLeaf> =
         all.iter().filter(|leaf| !layout.drop_dead || liveness.stored.contains(&leaf.leaf)).cloned().collect();
     let tables = tables(pipeline, layout, &needed)?;
-    if layout.place.is_empty() {
-        Ok(automatic::assign(tables, &needed, liveness))
+    let (tables, slots) = if layout.place.is_empty() {
+        automatic::assign(tables, &needed, liveness, layout.share)
     } else {
-        explicit::assign(tables, layout, &all, &needed)
-    }
+        explicit::assign(tables, layout, &all, &needed)?
+    };
+    let leaves = all.into_iter().map(|leaf| (leaf.leaf.clone(), leaf)).collect();
+    Ok(Placement { tables, slots, leaves })
 }
+
+/// Tables with their lanes, and where in them every leaf is.
+type Assigned = (Vec<Table>, BTreeMap<Leaf, Slot>);
+
+/// The name of the table of rays in flight.
+const RAYS: &str = "ray";
 
 /// The tables without their lanes.
 fn tables(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -> Result<Vec<Table>, Vec<Diagnostic>> {
@@ -137,13 +202,25 @@ fn tables(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -> Result<
         IndexMap::from([("state".to_owned(), pipeline.state.keys().cloned().collect())])
     } else {
         check_instances(pipeline, layout, needed)?;
-        let names = |(name, instances): (&String, &Vec<crate::source::Spanned<String>>)| {
-            (name.clone(), instances.iter().map(|instance| instance.value.clone()).collect())
+        let names = |(name, instances): (&String, &Vec<Spanned<String>>)| {
+            let present = instances.iter().map(|instance| instance.value.trim_end_matches(OPTIONAL));
+            (name.clone(), present.filter(|name| pipeline.state.contains_key(*name)).map(str::to_owned).collect())
         };
         layout.tables.iter().map(names).collect()
     };
-    let table = |(name, instances)| Table { name, instances, order: layout.order, lane: layout.lane, lanes: 0 };
-    Ok(listed.into_iter().map(table).collect())
+    let table = |name: String, instances, rays| Table {
+        name,
+        instances,
+        order: layout.order,
+        lane: layout.lane,
+        lanes: 0,
+        rays,
+    };
+    let mut tables: Vec<Table> = listed.into_iter().map(|(name, instances)| table(name, instances, false)).collect();
+    if layout.rays_apart {
+        tables.push(table(RAYS.to_owned(), pipeline.state.keys().cloned().collect(), true));
+    }
+    Ok(tables)
 }
 
 fn check_instances(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -> Result<(), Vec<Diagnostic>> {
@@ -151,10 +228,13 @@ fn check_instances(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -
     let mut seen = BTreeMap::new();
     for (table, instances) in &layout.tables {
         for instance in instances {
-            let name = &instance.value;
+            let name = instance.value.trim_end_matches(OPTIONAL);
             if !pipeline.state.contains_key(name) {
+                if name.len() < instance.value.len() {
+                    continue;
+                }
                 findings.push(unknown_instance(pipeline, table, instance));
-            } else if let Some(first) = seen.insert(name.clone(), instance.span) {
+            } else if let Some(first) = seen.insert(name.to_owned(), instance.span) {
                 let message = format!("instance `{name}` is in two tables");
                 findings.push(
                     Diagnostic::error("K0402", message)
@@ -175,7 +255,7 @@ fn check_instances(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -
     if findings.is_empty() { Ok(()) } else { Err(findings) }
 }
 
-fn unknown_instance(pipeline: &Pipeline, table: &str, instance: &crate::source::Spanned<String>) -> Diagnostic {
+fn unknown_instance(pipeline: &Pipeline, table: &str, instance: &Spanned<String>) -> Diagnostic {
     let names = || pipeline.state.keys().map(String::as_str);
     let message = format!("table `{table}` lists `{}`, which is no instance", instance.value);
     let help = match nearest(&instance.value, names()) {

@@ -1,30 +1,66 @@
 //! No two leaves overlap and no two paths either, whatever the records and the layout.
 
-use super::{Placement, Slot, StateLeaf, Table, automatic, explicit};
+use super::{Assigned, Bits, Slot, StateLeaf, Table, automatic, explicit};
 use crate::analyze::{KernelTraffic, Leaf, Liveness};
-use crate::config::model::{Layout, Order, Placed, PlacedField, PlacedRow};
+use crate::config::model::{Codec, Layout, Order, Placed, PlacedField, PlacedRow};
 use crate::config::quantity::LeafType;
 use crate::source::{FileId, Span};
 use indexmap::IndexMap;
 use proptest::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 const NOWHERE: Span = Span { file: FileId(0), start: 0, end: 0 };
 
 fn leaf(index: usize, ty: LeafType, bits: u32) -> StateLeaf {
     let leaf = Leaf { instance: "eye".into(), field: format!("f{index}"), member: None };
-    StateLeaf { leaf, ty, bits }
+    StateLeaf { leaf, ty, bits, quantity: "", codec: None }
+}
+
+/// A leaf that a codec keeps in parts of these widths.
+fn coded(index: usize, parts: Vec<u32>) -> StateLeaf {
+    let codec = Codec {
+        name: "c".into(),
+        quantities: Vec::new(),
+        parts,
+        errors: IndexMap::new(),
+        range: [0.0, 1.0],
+        doc: String::new(),
+        span: NOWHERE,
+    };
+    StateLeaf { codec: Some(codec), ..leaf(index, LeafType::Vec3, 96) }
 }
 
 fn leaves() -> impl Strategy<Value = Vec<StateLeaf>> {
-    let shape = prop_oneof![
+    let plain = prop_oneof![
         (1..=32u32).prop_map(|bits| (LeafType::U32, bits)),
         Just((LeafType::Real, 32)),
         Just((LeafType::Vec2, 64)),
         Just((LeafType::Vec3, 96)),
     ];
-    prop::collection::vec(shape, 0..24)
-        .prop_map(|shapes| shapes.into_iter().enumerate().map(|(index, (ty, bits))| leaf(index, ty, bits)).collect())
+    let plain = plain.prop_map(|(ty, bits)| leaf(0, ty, bits));
+    let coded = prop::collection::vec(1..=32u32, 1..4).prop_map(|parts| coded(0, parts));
+    let named = |leaves: Vec<StateLeaf>| {
+        let rename = |(index, leaf): (usize, StateLeaf)| StateLeaf {
+            leaf: Leaf { field: format!("f{index}"), ..leaf.leaf.clone() },
+            ..leaf
+        };
+        leaves.into_iter().enumerate().map(rename).collect()
+    };
+    prop::collection::vec(prop_oneof![plain, coded], 0..24).prop_map(named)
+}
+
+/// What is alive behind each of some kernels: a set of indices of leaves for each.
+fn lives() -> impl Strategy<Value = Vec<Vec<usize>>> {
+    prop::collection::vec(prop::collection::vec(0..24usize, 0..16), 1..6)
+}
+
+fn liveness(leaves: &[StateLeaf], lives: &[Vec<usize>]) -> Liveness {
+    let kernel = |(index, alive): (usize, &Vec<usize>)| {
+        let alive: BTreeSet<Leaf> = alive.iter().filter_map(|&index| Some(leaves.get(index)?.leaf.clone())).collect();
+        let traffic = KernelTraffic { stores: alive.clone(), live_out: alive, ..KernelTraffic::default() };
+        (format!("k{index}"), traffic)
+    };
+    Liveness { kernels: lives.iter().enumerate().map(kernel).collect(), ..Liveness::default() }
 }
 
 fn orders() -> impl Strategy<Value = Order> {
@@ -37,26 +73,31 @@ fn lanes() -> impl Strategy<Value = u32> {
 }
 
 fn table(order: Order, lane: u32) -> Table {
-    Table { name: "state".into(), instances: vec!["eye".into()], order, lane, lanes: 0 }
+    Table { name: "state".into(), instances: vec!["eye".into()], order, lane, lanes: 0, rays: false }
 }
 
 fn bits(slot: &Slot) -> impl Iterator<Item = (u32, u32)> + '_ {
-    slot.words.iter().flat_map(|&word| (slot.shift..slot.shift + slot.bits).map(move |bit| (word, bit)))
+    slot.parts.iter().flat_map(|part| (part.shift..part.shift + part.bits).map(|bit| (part.word, bit)))
 }
 
-fn words(leaves: &[StateLeaf]) -> u32 {
-    leaves.iter().filter(|leaf| leaf.bits >= 32).map(|leaf| leaf.ty.words()).sum()
+/// Lanes of one table for leaves without codecs, and the slots.
+fn plain(leaves: &[StateLeaf], lane: u32, liveness: &Liveness) -> Assigned {
+    automatic::assign(vec![table(Order::Aos, lane)], leaves, liveness, false)
+}
+
+fn word_of(slots: &BTreeMap<Leaf, Slot>, leaf: &StateLeaf) -> Vec<u32> {
+    slots[&leaf.leaf].parts.iter().map(|part| part.word).collect()
 }
 
 proptest! {
     #[test]
-    fn no_two_leaves_overlap(leaves in leaves(), order in orders(), lane in lanes()) {
-        let Placement { tables, slots } = automatic::assign(vec![table(order, lane)], &leaves, &Liveness::default());
+    fn no_two_leaves_overlap(leaves in leaves(), lane in lanes()) {
+        let (tables, slots) = plain(&leaves, lane, &Liveness::default());
         let mut taken = BTreeSet::new();
         for leaf in &leaves {
             let slot = &slots[&leaf.leaf];
-            prop_assert_eq!(slot.words.len() as u32, leaf.ty.words());
-            prop_assert_eq!(slot.bits, leaf.bits.min(32));
+            let widths: Vec<u32> = slot.parts.iter().map(|part| part.bits).collect();
+            prop_assert_eq!(widths, leaf.parts());
             for bit in bits(slot) {
                 prop_assert!(bit.0 < tables[0].lanes * lane && bit.1 < 32);
                 prop_assert!(taken.insert(bit), "{} overlaps", leaf.leaf);
@@ -64,12 +105,35 @@ proptest! {
         }
     }
 
+    /// Sharing: what is alive behind one kernel has bits of its own, whatever else has the same ones; and there are never more lanes
+    /// than without.
     #[test]
-    fn lanes_are_as_few_as_the_words_need(leaves in leaves(), lane in lanes()) {
-        let Placement { tables, slots } = automatic::assign(vec![table(Order::Aos, lane)], &leaves, &Liveness::default());
-        let shared: BTreeSet<u32> =
-            leaves.iter().filter(|leaf| leaf.bits < 32).map(|leaf| slots[&leaf.leaf].words[0]).collect();
-        prop_assert_eq!(tables[0].lanes, (words(&leaves) + shared.len() as u32).div_ceil(lane));
+    fn what_lives_together_does_not_overlap(leaves in leaves(), lives in lives(), lane in lanes()) {
+        let liveness = liveness(&leaves, &lives);
+        let (tables, slots) = automatic::assign(vec![table(Order::Soa, lane)], &leaves, &liveness, true);
+        for kernel in liveness.kernels.values() {
+            let mut taken = BTreeSet::new();
+            for leaf in &kernel.live_out {
+                for bit in bits(&slots[leaf]) {
+                    prop_assert!(bit.0 < tables[0].lanes * lane && bit.1 < 32);
+                    prop_assert!(taken.insert(bit), "{} overlaps", leaf);
+                }
+            }
+        }
+        let (apart, _) = plain(&leaves, lane, &liveness);
+        prop_assert!(tables[0].lanes <= apart[0].lanes);
+    }
+
+    #[test]
+    fn lanes_are_as_few_as_the_words_need(
+        shapes in prop::collection::vec(prop_oneof![Just(LeafType::Real), Just(LeafType::Vec2), Just(LeafType::Vec3)], 0..24),
+        lane in lanes(),
+    ) {
+        let leaves: Vec<StateLeaf> =
+            shapes.iter().enumerate().map(|(index, &ty)| leaf(index, ty, 32 * ty.words())).collect();
+        let (tables, _) = plain(&leaves, lane, &Liveness::default());
+        let words: u32 = shapes.iter().map(|ty| ty.words()).sum();
+        prop_assert_eq!(tables[0].lanes, words.div_ceil(lane));
     }
 
     #[test]
@@ -96,23 +160,22 @@ fn a_vec3_and_a_word_share_a_lane_of_four() {
         leaf(3, LeafType::U32, 5),
         leaf(4, LeafType::U32, 19),
     ];
-    let placement = automatic::assign(vec![table(Order::Aos, 4)], &leaves, &Liveness::default());
-    let words = |index: usize| placement.slots[&leaves[index].leaf].words.clone();
-    assert_eq!(placement.tables[0].lanes, 2);
-    assert_eq!(words(0), [0, 1, 2]);
-    assert_eq!(words(1), [4, 5, 6]);
-    assert_eq!(words(2), [3]);
-    assert_eq!((words(3), placement.slots[&leaves[3].leaf].shift), (vec![7], 0));
-    assert_eq!((words(4), placement.slots[&leaves[4].leaf].shift), (vec![7], 5));
+    let (tables, slots) = plain(&leaves, 4, &Liveness::default());
+    assert_eq!(tables[0].lanes, 2);
+    assert_eq!(word_of(&slots, &leaves[0]), [0, 1, 2]);
+    assert_eq!(word_of(&slots, &leaves[1]), [4, 5, 6]);
+    assert_eq!(word_of(&slots, &leaves[2]), [3]);
+    assert_eq!(slots[&leaves[3].leaf].parts, [Bits { word: 7, shift: 0, bits: 5 }]);
+    assert_eq!(slots[&leaves[4].leaf].parts, [Bits { word: 7, shift: 5, bits: 19 }]);
 }
 
 #[test]
 fn vectors_are_split_only_where_that_saves_a_lane() {
     let leaves: Vec<StateLeaf> = (0..4).map(|index| leaf(index, LeafType::Vec3, 96)).collect();
-    let placement = automatic::assign(vec![table(Order::Aos, 4)], &leaves, &Liveness::default());
-    assert_eq!(placement.tables[0].lanes, 3);
-    assert_eq!(placement.slots[&leaves[0].leaf].words, [0, 1, 2]);
-    assert_eq!(placement.slots[&leaves[3].leaf].words, [3, 7, 11]);
+    let (tables, slots) = plain(&leaves, 4, &Liveness::default());
+    assert_eq!(tables[0].lanes, 3);
+    assert_eq!(word_of(&slots, &leaves[0]), [0, 1, 2]);
+    assert_eq!(word_of(&slots, &leaves[3]), [3, 7, 11]);
 }
 
 #[test]
@@ -129,10 +192,32 @@ fn what_the_same_kernels_access_shares_a_lane() {
     let shade = KernelTraffic { stores: set(&[0, 4]), ..KernelTraffic::default() };
     let trace = KernelTraffic { stores: set(&[1, 2, 3]), ..KernelTraffic::default() };
     let kernels = [("shade".to_owned(), shade), ("trace".to_owned(), trace)].into_iter().collect();
-    let liveness = Liveness { kernels, ..Liveness::default() };
-    let placement = automatic::assign(vec![table(Order::Aos, 4)], &leaves, &liveness);
-    let words = |index: usize| placement.slots[&leaves[index].leaf].words.clone();
-    assert_eq!((words(1), words(2), words(3), words(4)), (vec![4, 5], vec![6], vec![7], vec![3]));
+    let (_, slots) = plain(&leaves, 4, &Liveness { kernels, ..Liveness::default() });
+    let words: Vec<Vec<u32>> = leaves.iter().map(|leaf| word_of(&slots, leaf)).collect();
+    assert_eq!(words[1..], [vec![4, 5], vec![6], vec![7], vec![3]]);
+}
+
+#[test]
+fn a_ray_and_its_hit_share_words_in_the_table_of_rays() {
+    // The origin is not needed once the ray has been traced, the direction is.
+    let leaves = [
+        leaf(0, LeafType::Vec3, 96),
+        leaf(1, LeafType::Vec3, 96),
+        leaf(2, LeafType::Vec2, 64),
+        leaf(3, LeafType::Vec3, 96),
+    ];
+    let set =
+        |indices: &[usize]| -> BTreeSet<Leaf> { indices.iter().map(|&index| leaves[index].leaf.clone()).collect() };
+    let behind = |alive: &[usize]| KernelTraffic { live_out: set(alive), ..KernelTraffic::default() };
+    let kernels = [("shade".to_owned(), behind(&[0, 1, 3])), ("trace".to_owned(), behind(&[1, 2, 3]))];
+    let liveness =
+        Liveness { kernels: kernels.into_iter().collect(), in_flight: set(&[0, 1, 2]), ..Liveness::default() };
+    let rays = Table { name: "ray".into(), rays: true, ..table(Order::Soa, 1) };
+    let (tables, slots) = automatic::assign(vec![table(Order::Soa, 1), rays], &leaves, &liveness, true);
+    assert_eq!((tables[0].lanes, tables[1].lanes), (3, 6));
+    assert!(slots[&leaves[0].leaf].overlaps(&slots[&leaves[2].leaf]));
+    assert!(!slots[&leaves[1].leaf].overlaps(&slots[&leaves[2].leaf]));
+    assert_eq!(slots[&leaves[3].leaf].table, 0);
 }
 
 fn placed(text: &str) -> PlacedField {
@@ -144,7 +229,7 @@ fn placed(text: &str) -> PlacedField {
 }
 
 /// Rows of words; a word with `+` in it is shared.
-fn explicit(rows: &[&[&str]]) -> Result<Placement, Vec<&'static str>> {
+fn explicit(rows: &[&[&str]]) -> Result<Assigned, Vec<&'static str>> {
     let all = [
         leaf(0, LeafType::Vec3, 96),
         leaf(1, LeafType::Real, 32),
@@ -154,6 +239,8 @@ fn explicit(rows: &[&[&str]]) -> Result<Placement, Vec<&'static str>> {
             leaf: Leaf { instance: "light".into(), field: "t".into(), member: None },
             ty: LeafType::Real,
             bits: 32,
+            quantity: "",
+            codec: None,
         },
     ];
     let part = |text: &&str| match text.contains('+') {
@@ -167,6 +254,9 @@ fn explicit(rows: &[&[&str]]) -> Result<Placement, Vec<&'static str>> {
         order: Order::Aos,
         lane: 4,
         drop_dead: true,
+        share: false,
+        rays_apart: false,
+        encode: IndexMap::new(),
         tables: IndexMap::new(),
         place: rows.iter().map(row).collect(),
         span: NOWHERE,
@@ -178,15 +268,15 @@ fn explicit(rows: &[&[&str]]) -> Result<Placement, Vec<&'static str>> {
 
 #[test]
 fn rows_are_followed() {
-    let placement = explicit(&[&["eye.f0", "eye.f1"], &["_", "eye.f2:8+_:5+eye.f3:19", "_", "_"]]).unwrap();
-    assert_eq!(placement.tables[0].lanes, 2);
-    let slot = |index: usize| {
+    let (tables, slots) = explicit(&[&["eye.f0", "eye.f1"], &["_", "eye.f2:8+_:5+eye.f3:19", "_", "_"]]).unwrap();
+    assert_eq!(tables[0].lanes, 2);
+    let parts = |index: usize| {
         let leaf = Leaf { instance: "eye".into(), field: format!("f{index}"), member: None };
-        placement.slots[&leaf].clone()
+        slots[&leaf].parts.clone()
     };
-    assert_eq!(slot(1).words, [3]);
-    assert_eq!(slot(2), Slot { table: 0, words: vec![5], shift: 0, bits: 8 });
-    assert_eq!(slot(3), Slot { table: 0, words: vec![5], shift: 13, bits: 19 });
+    assert_eq!(parts(1), [Bits { word: 3, shift: 0, bits: 32 }]);
+    assert_eq!(parts(2), [Bits { word: 5, shift: 0, bits: 8 }]);
+    assert_eq!(parts(3), [Bits { word: 5, shift: 13, bits: 19 }]);
 }
 
 #[test]

@@ -168,7 +168,6 @@ fn lobe_effects(evidence: &Evidence<'_>) -> Vec<Finding> {
     let with = |test: &dyn Fn(&Material, Lobes) -> bool, verb: &str| {
         first(evidence, |m| test(m, lobes(m, evidence.images)), verb)
     };
-    let absorbs = |m: &Material| m.absorption.iter().any(|&sigma| sigma > 0.0);
     vec![
         ("diffuse", with(&|_, l| l.diffuse, "has a diffuse lobe").ok_or("no material has a diffuse lobe")),
         ("specular", with(&|_, l| l.reflects, "reflects specularly").ok_or("every material is exactly Lambert")),
@@ -200,7 +199,10 @@ fn lobe_effects(evidence: &Evidence<'_>) -> Vec<Finding> {
             with(&|_, l| l.transmits && l.smooth, "transmits and is perfectly smooth")
                 .ok_or("no material that transmits is perfectly smooth"),
         ),
-        ("attenuation", with(&|m, l| l.transmits && m.solid && absorbs(m), "absorbs inside").ok_or("no solid absorbs")),
+        (
+            "attenuation",
+            with(&|m, l| l.transmits && m.solid && m.absorbs(), "absorbs inside").ok_or("no solid absorbs"),
+        ),
         (
             "delta",
             with(&|_, l| l.smooth && (l.reflects || l.transmits), "is perfectly smooth").ok_or("no lobe is a delta"),

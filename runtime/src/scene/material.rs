@@ -73,6 +73,13 @@ pub struct Material {
     pub uv_sets: Vec<u32>,
 }
 
+impl Material {
+    /// Whether light is absorbed inside of what it bounds.
+    pub fn absorbs(&self) -> bool {
+        self.absorption.iter().any(|&sigma| sigma > 0.0)
+    }
+}
+
 /// Reads a material.
 ///
 /// # Errors

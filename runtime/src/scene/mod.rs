@@ -123,6 +123,7 @@ fn read(source: &source::Source, options: &LoadOptions) -> Result<Scene> {
     let (meshes, materials) = meshes(&document, &placements.instances, &mut textures, &mut warnings)?;
     let images = textures.decode(&document)?;
     check_texels(&images)?;
+    check_media(&materials)?;
     let geometry = triangle::flatten(&placements.instances, &meshes, &materials, &images)?;
     if geometry.dropped > 0 {
         warnings.push(format!("{} triangles without area are left out", geometry.dropped));
@@ -221,6 +222,21 @@ fn meshes(
         meshes.insert(mesh.index(), primitives);
     }
     Ok((meshes, materials))
+}
+
+/// Walks keep the number of the medium that they are in, in 8 bits.
+const MOST_MEDIA: usize = 255;
+
+fn check_media(materials: &[Material]) -> Result<()> {
+    let absorbing = materials.iter().filter(|material| material.absorbs());
+    let Some(surplus) = absorbing.clone().nth(MOST_MEDIA) else { return Ok(()) };
+    let message = format!(
+        "{} materials absorb light inside of solids; {} is the first too many",
+        absorbing.count(),
+        surplus.name
+    );
+    Err(Error::input(message)
+        .help(format!("at most {MOST_MEDIA} with an `attenuationDistance`: merge those that are equal")))
 }
 
 /// Texels are addressed with 32 bits.

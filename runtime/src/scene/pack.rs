@@ -17,7 +17,7 @@ const NO_LIGHT: u32 = u32::MAX;
 const LEAST_BYTES: usize = 16;
 
 /// Names of the tables that describe a scene. `blue_noise` is a resource beside them.
-pub const RESOURCES: [&str; 16] = [
+pub const RESOURCES: [&str; 17] = [
     "bvh_nodes",
     "bvh2_nodes",
     "bvh_triangles",
@@ -26,6 +26,7 @@ pub const RESOURCES: [&str; 16] = [
     "triangle_tangents",
     "triangle_colors",
     "materials",
+    "media",
     "texture_slots",
     "texels",
     "lights",
@@ -63,7 +64,8 @@ fn pack(scene: &Scene, name: &str) -> Vec<u8> {
         "triangle_uvs" => bytes(&uvs(scene)),
         "triangle_tangents" => bytes(&per_corner(scene, |triangle| triangle.tangents)),
         "triangle_colors" => bytes(&per_corner(scene, |triangle| triangle.colors)),
-        "materials" => bytes(&scene.materials.iter().map(material).collect::<Vec<_>>()),
+        "materials" => bytes(&materials(scene)),
+        "media" => bytes(&media(scene)),
         "texture_slots" => bytes(&texture_slots(scene)),
         "texels" => bytes(&scene.images.iter().flat_map(|image| image.texels.iter().copied()).collect::<Vec<_>>()),
         "lights" => bytes(&lights(scene)),
@@ -119,18 +121,32 @@ fn uvs(scene: &Scene) -> Vec<[f32; 2]> {
     sets.flat_map(|set| per_corner(scene, move |triangle| triangle.uvs[set])).collect()
 }
 
-fn material(material: &Material) -> [[f32; 4]; 6] {
+fn materials(scene: &Scene) -> Vec<[[f32; 4]; 5]> {
+    let mut media = 0;
+    let row = |source: &Material| {
+        media += u32::from(source.absorbs());
+        material(source, if source.absorbs() { media } else { 0 })
+    };
+    scene.materials.iter().map(row).collect()
+}
+
+/// Absorption by number of the medium: nothing, then one row for each material that absorbs.
+fn media(scene: &Scene) -> Vec<[f32; 4]> {
+    let absorbing = scene.materials.iter().filter(|material| material.absorbs());
+    let rows = absorbing.map(|material| material.absorption).map(|[r, g, b]| [r, g, b, 0.0]);
+    std::iter::once([0.0; 4]).chain(rows).collect()
+}
+
+fn material(material: &Material, medium: u32) -> [[f32; 4]; 5] {
     let [r, g, b] = material.base_color;
     let [er, eg, eb] = material.emission;
     let [sr, sg, sb] = material.specular_color;
-    let [ar, ag, ab] = material.absorption;
     [
         [r, g, b, material.alpha],
         [material.metallic, material.roughness, material.ior, material.transmission],
         [er, eg, eb, f32::from_bits(material_flags(material))],
         [sr, sg, sb, material.specular],
-        [ar, ag, ab, material.alpha_cutoff],
-        [material.normal_scale, 0.0, 0.0, 0.0],
+        [material.normal_scale, material.alpha_cutoff, f32::from_bits(medium), 0.0],
     ]
 }
 

@@ -4,6 +4,7 @@
 import package::real::{real, vec3r};
 import package::features::{HAS_DELTA, HAS_DELTA_SPECULAR, HAS_DELTA_TRANSMISSION, HAS_DIFFUSE, HAS_METAL, HAS_NORMAL_MAP, HAS_ROUGH_SPECULAR, HAS_ROUGH_TRANSMISSION, HAS_SHADING_NORMALS, HAS_SOLID_GLASS, HAS_SPECULAR, HAS_THIN_GLASS, HAS_TRANSMISSION};
 import package::params::{refraction_adjoint, shading_normal_adjoint};
+import package::stored::{stored_importance_direction, stored_radiance_direction};
 import package::math::frame::{Frame, frame_of, to_local, to_world};
 import package::math::vector::max_component;
 import package::sample::hemisphere::{pdf_cosine_hemisphere, sample_cosine_hemisphere};
@@ -274,13 +275,13 @@ fn sample_lobe(bsdf: Bsdf, outgoing: vec3r, random: vec3r, mode: u32) -> BsdfSam
 fn direction_sample(bsdf: Bsdf, outgoing: vec3r, local_incoming: vec3r, diffuse: bool, mode: u32) -> BsdfSample {
     var sample: BsdfSample;
     sample.diffuse = diffuse;
-    sample.direction = to_world(bsdf.frame, local_incoming);
+    sample.direction = stored_direction(to_world(bsdf.frame, local_incoming), mode);
     let scattered = eval_bsdf(bsdf, outgoing, sample.direction, mode);
     if scattered.pdf > 0.0 {
         sample.weight = scattered.value / scattered.pdf;
         sample.pdf = scattered.pdf;
         if HAS_TRANSMISSION {
-            sample.transmitted = local_incoming.z < 0.0;
+            sample.transmitted = dot(sample.direction, bsdf.frame.normal) < 0.0;
         }
     }
     return sample;
@@ -432,11 +433,19 @@ fn sample_delta_glass(bsdf: Bsdf, outgoing: vec3r, choice: real, probability: re
     return delta_sample(bsdf, outgoing, incoming, weight, probability * (1.0 - reflectance), mode);
 }
 
+/// A sampled direction as the walk will find it in its state: what is evaluated must be what is traced.
+fn stored_direction(direction: vec3r, mode: u32) -> vec3r {
+    if mode == IMPORTANCE {
+        return stored_importance_direction(direction);
+    }
+    return stored_radiance_direction(direction);
+}
+
 /// Completes a delta sample: rejects directions on which the two normals disagree, corrects importance for the
 /// shading normal. `weight` is that of radiance without index factor.
 fn delta_sample(bsdf: Bsdf, outgoing: vec3r, local_incoming: vec3r, weight: vec3r, pdf: real, mode: u32) -> BsdfSample {
     var sample: BsdfSample;
-    sample.direction = to_world(bsdf.frame, local_incoming);
+    sample.direction = stored_direction(to_world(bsdf.frame, local_incoming), mode);
     if !hemispheres_agree(bsdf, outgoing, sample.direction) {
         return sample;
     }

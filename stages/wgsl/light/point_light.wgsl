@@ -3,6 +3,7 @@
 import package::real::{real, vec2r, vec3r};
 import package::features::HAS_SPOT_LIGHT;
 import package::math::constants::INVERSE_PI;
+import package::stored::stored_importance_direction;
 import package::math::frame::{frame_of, to_world};
 import package::sample::sphere::{pdf_cone, sample_cone, sample_sphere};
 import package::surface::surface::Surface;
@@ -64,6 +65,7 @@ fn emit_point_light(vertex: LightVertex, random: vec2r) -> Emission {
             emission.direction = to_world(frame_of(vec3r(axis.xyz)), sample_cone(random, real(axis.w)));
         }
     }
+    emission.direction = stored_importance_direction(emission.direction);
     emission.cosine = 1.0;
     emission.pdf = point_light_pdf_w(vertex.light);
     emission.weight = vec3r(point_light_falloff(vertex.light, emission.direction) / emission.pdf);

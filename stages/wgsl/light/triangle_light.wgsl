@@ -3,6 +3,7 @@
 import package::real::{real, vec2r, vec3r, vec4r};
 import package::features::{HAS_ALPHA, HAS_TWO_SIDED_EMISSION};
 import package::math::constants::{INVERSE_PI, PI};
+import package::stored::stored_importance_direction;
 import package::math::frame::{frame_of, to_world};
 import package::sample::hemisphere::sample_cosine_hemisphere;
 import package::sample::triangle::sample_triangle;
@@ -70,7 +71,7 @@ fn emit_triangle_light(vertex: LightVertex, random: vec4r) -> Emission {
     let sides = emitting_sides(point);
     let normal = select(point.geometric_normal, -point.geometric_normal, sides > 1.0 && random.z < 0.5);
     var emission: Emission;
-    emission.direction = to_world(frame_of(normal), sample_cosine_hemisphere(random.xy));
+    emission.direction = stored_importance_direction(to_world(frame_of(normal), sample_cosine_hemisphere(random.xy)));
     emission.origin = spawn_origin(point, emission.direction);
     emission.cosine = abs(dot(point.geometric_normal, emission.direction));
     emission.pdf = emission_pdf_w(point, emission.cosine);

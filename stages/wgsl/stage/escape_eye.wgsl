@@ -4,7 +4,7 @@ import package::outcome::ENDED;
 import package::features::HAS_SKY;
 import package::light::directional_light::pdf_disk;
 import package::light::sky::{sky_pdf_w, sky_radiance};
-import package::transport::advance::sums_of;
+import package::transport::advance::eye_sums;
 import package::transport::implicit::add_implicit;
 import package::transport::recursive_mis::{join, scaled};
 import package::transport::strategy::{implicit_counts, is_used};
@@ -17,7 +17,7 @@ fn escape_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
             var rivals = real(0.0);
             if edges > 1u {
                 let pdf_sky = sky_pdf_w(eye.direction);
-                let sums = sums_of(eye);
+                let sums = eye_sums(eye);
                 let sampled = select(0.0, pdf_sky, is_used(edges - 1u, 1u));
                 rivals = join(scaled(sampled, sums.a), scaled(pdf_sky * pdf_disk(), sums.b));
             }

@@ -8,7 +8,7 @@ import package::surface::surface::surface_on;
 import package::surface::material::material_at;
 import package::bsdf::bsdf::{IMPORTANCE, bsdf_at, sample_bsdf};
 import package::light::emission::emit_light_ray;
-import package::transport::advance::{advance, set_sums, sums_of};
+import package::transport::advance::{advance, light_sums, set_sums};
 import package::transport::connect::stored_light_vertex;
 import package::transport::dimension::DIMENSION_DIRECTION;
 import package::transport::recursive_mis::{MisPartial, scaled, source};
@@ -40,7 +40,7 @@ fn extend_light(light: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     if is_absorbed(sample) || !survives(light, &sample, bsdf, t, random.w, IMPORTANCE) {
         return ABSORBED;
     }
-    advance(light, surface, bsdf, sample, sums_of(light), light_joins(t - 1u));
+    advance(light, surface, bsdf, sample, light_sums(light), light_joins(t - 1u));
     return SCATTERED;
 }
 

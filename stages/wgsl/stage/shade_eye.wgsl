@@ -8,7 +8,7 @@ import package::surface::surface::{NO_LIGHT, Surface};
 import package::surface::material::{emission_at, is_emissive, material_at};
 import package::bsdf::bsdf::{RADIANCE, bsdf_at, is_connectable, sample_bsdf};
 import package::light::triangle_light::{emission_pdf_w, triangle_light_pdf_area};
-import package::transport::advance::{advance, meet, surface_cosine};
+import package::transport::advance::{advance, eye_sums, meet, surface_cosine};
 import package::transport::connect::connect;
 import package::transport::dimension::eye_vertex;
 import package::transport::implicit::add_implicit;
@@ -24,7 +24,7 @@ fn shade_eye(eye: ptr<function, Walk>, light: ptr<function, Walk>, path: ptr<fun
     let s = path.eye_length;
     let t = path.light_length;
     let surface = arrive(eye);
-    let sums = meet(eye, surface, false);
+    let sums = meet(eye, eye_sums(eye), surface, false);
     if HAS_AREA_LIGHT {
         if is_emissive(surface) && implicit_counts(s, t) {
             add_met_emission(eye, surface, sums, s);

@@ -9,7 +9,7 @@ import package::surface::spawn::segment_to_point;
 import package::bsdf::bsdf::{Bsdf, IMPORTANCE, bsdf_at, eval_bsdf, is_connectable, reverse_pdf_bsdf};
 import package::camera::camera::connect_camera;
 import package::tallies::count_light_vertices;
-import package::transport::advance::{meet, set_sums, surface_cosine};
+import package::transport::advance::{light_sums, meet, set_sums, surface_cosine};
 import package::transport::direct::offer_particle_strategy;
 import package::transport::recursive_mis::{MisPartial, closed_sum, scaled, weight_over};
 import package::transport::strategy::{eye_limit, implicit_term, is_used, light_joins};
@@ -25,7 +25,7 @@ fn shade_light_mis(light: ptr<function, Walk>, path: ptr<function, Path>) -> u32
     if HAS_DIRECTIONAL_LIGHT || HAS_SKY {
         parallel = (light.flags & FLAGS_PARALLEL) != 0u;
     }
-    let sums = meet(light, surface, parallel);
+    let sums = meet(light, light_sums(light), surface, parallel);
     set_sums(light, sums);
     if is_used(0u, t) {
         let bsdf = bsdf_at(surface, material_at(surface), -light.direction);

@@ -1,7 +1,7 @@
 //! What a surface is made of at a point: factors times textures times vertex colours (glTF 2.0 and its KHR_materials extensions).
 
 import package::real::{real, vec3r};
-import package::features::{HAS_ATTENUATION, HAS_METAL, HAS_SOLID_GLASS, HAS_SPECULAR, HAS_TEXTURE_BASE_COLOR};
+import package::features::{HAS_METAL, HAS_SOLID_GLASS, HAS_SPECULAR, HAS_TEXTURE_BASE_COLOR};
 import package::features::{HAS_TEXTURE_EMISSIVE, HAS_TEXTURE_METALLIC_ROUGHNESS, HAS_TEXTURE_SPECULAR, HAS_TEXTURE_TRANSMISSION};
 import package::features::{HAS_TRANSMISSION, HAS_TWO_SIDED_EMISSION, HAS_VERTEX_COLORS};
 import package::surface::material_table::{MATERIAL_DOUBLE_SIDED, MATERIAL_SOLID, MATERIAL_VERTEX_COLORS, material_flags, material_row};
@@ -20,8 +20,6 @@ struct Material {
     transmission: real,
     specular_color: vec3r,
     specular: real,
-    /// Absorption inside, 1/m.
-    attenuation: vec3r,
     /// Bounds a volume; otherwise one thin sheet.
     solid: bool,
     double_sided: bool,
@@ -48,9 +46,6 @@ fn material_at(surface: Surface) -> Material {
         material.transmission = real(shape.w);
         if HAS_SOLID_GLASS {
             material.solid = (flags & MATERIAL_SOLID) != 0u;
-        }
-        if HAS_ATTENUATION {
-            material.attenuation = vec3r(material_row(surface.material, 4u).xyz);
         }
     }
     if HAS_TEXTURE_METALLIC_ROUGHNESS || HAS_TEXTURE_TRANSMISSION || HAS_TEXTURE_SPECULAR {

@@ -1,16 +1,16 @@
 //! Rows and flags of the material table.
 
-/// Six vec4 per material: (base colour, alpha) (metallic, roughness, ior, transmission) (emitted radiance, flags)
-/// (specular colour, specular) (attenuation 1/m, alpha cutoff) (normal scale, 0, 0, 0).
+/// Five vec4 per material: (base colour, alpha) (metallic, roughness, ior, transmission) (emitted radiance, flags)
+/// (specular colour, specular) (normal scale, alpha cutoff, medium, 0). The medium is the number of what is inside of it.
 var<storage, read> materials: array<vec4f>;
 
-const MATERIAL_ROWS: u32 = 6u;
+const MATERIAL_ROWS: u32 = 5u;
 const MATERIAL_DOUBLE_SIDED: u32 = 1u;
 const MATERIAL_SOLID: u32 = 2u;
 const MATERIAL_ALPHA_MASK: u32 = 4u;
 const MATERIAL_VERTEX_COLORS: u32 = 16u;
 
-/// Row `row` (0 to 5) of a material.
+/// Row `row` (0 to 4) of a material.
 fn material_row(material: u32, row: u32) -> vec4f {
     return materials[MATERIAL_ROWS * material + row];
 }

@@ -18,7 +18,7 @@ fn mapped_normal(material: u32, prim: u32, barycentric: vec2r, uv0: vec2r, uv1: 
     let stored = tangent_at(prim, barycentric);
     let tangent = safe_normalize(stored.xyz - normal * dot(stored.xyz, normal), vec3r(0.0));
     let bitangent = stored.w * cross(normal, tangent);
-    let scale = real(material_row(material, 5u).x);
+    let scale = real(material_row(material, 4u).x);
     let local = 2.0 * sample_texture(material, ROLE_NORMAL, uv0, uv1).xyz - 1.0;
     let mapped = safe_normalize(scale * (local.x * tangent + local.y * bitangent) + local.z * normal, normal);
     let height = dot(mapped, geometric_normal);

@@ -33,7 +33,7 @@ fn opacity_at(prim: u32, material: u32, barycentric: vec2f) -> f32 {
         }
     }
     if (flags & MATERIAL_ALPHA_MASK) != 0u {
-        return select(0.0, 1.0, opacity >= material_row(material, 4u).w);
+        return select(0.0, 1.0, opacity >= material_row(material, 4u).y);
     }
     return opacity;
 }

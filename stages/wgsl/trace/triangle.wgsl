@@ -12,6 +12,9 @@ const TRIANGLE_ALPHA_TESTED: u32 = 1u;
 const EDGE_TOLERANCE: f32 = 1.1920928955078125e-7;
 /// Rounding bound of the determinant relative to the 1-norm of the triangle's normal: 2^-22.
 const DETERMINANT_TOLERANCE: f32 = 2.384185791015625e-7;
+/// Rounding bound of distances relative to them, 2^-22: back faces count as so much farther, front faces as so much nearer. Of a plate
+/// that is thinner than rounding at the ray's length, the ray meets the side that faces it, and light that leaves there gets away.
+const DISTANCE_TOLERANCE: f32 = 2.384185791015625e-7;
 
 /// Where a ray meets a triangle, if it does.
 struct TriangleHit {
@@ -63,7 +66,7 @@ fn intersect_triangle(prim: u32, origin: vec3f, direction: vec3f, t_max: f32) ->
     let scale = abs(determinant);
     let u = side * dot(e2, moment);
     let v = -side * dot(e1, moment);
-    let distance = side * dot(normal, to_vertex);
+    let distance = (side + DISTANCE_TOLERANCE) * dot(normal, to_vertex);
 
     let reach = EDGE_TOLERANCE * (one_norm(moment) + one_norm(e1) + one_norm(e2));
     let slack_u = reach * one_norm(e2);

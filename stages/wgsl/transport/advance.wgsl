@@ -8,9 +8,14 @@ import package::features::HAS_DELTA;
 import package::transport::walk::depart;
 import package::transport::recursive_mis::{MisPartial, arrived_sums, scattered_sums, specular_sums};
 
-/// The sums that the walk carries.
-fn sums_of(walk: ptr<function, Walk>) -> MisPartial {
-    return MisPartial(walk.mis_a, walk.mis_b, walk.mis_c);
+/// The sums that a light walk carries.
+fn light_sums(light: ptr<function, Walk>) -> MisPartial {
+    return MisPartial(light.mis_a, light.mis_b, light.mis_c);
+}
+
+/// The sums that an eye walk carries: what stands for hitting the light is on the other side.
+fn eye_sums(eye: ptr<function, Walk>) -> MisPartial {
+    return MisPartial(eye.mis_a, eye.mis_b, 0.0);
 }
 
 /// Stores the sums in the walk.
@@ -25,10 +30,10 @@ fn surface_cosine(surface: Surface, direction: vec3r) -> real {
     return abs(dot(surface.geometric_normal, direction));
 }
 
-/// The sums after the walk's ray has met `surface`; `parallel`: it came from infinity.
-fn meet(walk: ptr<function, Walk>, surface: Surface, parallel: bool) -> MisPartial {
+/// The sums, before `sums`, after the walk's ray has met `surface`; `parallel`: it came from infinity.
+fn meet(walk: ptr<function, Walk>, sums: MisPartial, surface: Surface, parallel: bool) -> MisPartial {
     let distance = select(walk.hit.t, 1.0, parallel);
-    return arrived_sums(sums_of(walk), distance * distance, surface_cosine(surface, walk.direction));
+    return arrived_sums(sums, distance * distance, surface_cosine(surface, walk.direction));
 }
 
 /// Sends the walk on along a sampled direction. `sums` are those at the surface, `ended` as in `scattered_sums`.

@@ -9,7 +9,7 @@ import package::surface::spawn::{SHORTEST_LENGTH, segment_between};
 import package::bsdf::bsdf::{Bsdf, IMPORTANCE, RADIANCE, bsdf_at, eval_bsdf, is_connectable, reverse_pdf_bsdf};
 import package::light::emission::light_end;
 import package::light::light_vertex::{LightEnd, LightVertex};
-import package::transport::advance::{sums_of, surface_cosine};
+import package::transport::advance::{light_sums, surface_cosine};
 import package::transport::direct::offer_strategy;
 import package::transport::recursive_mis::{MisPartial, SMALLEST_SUM, closed_sum, join, scaled, weight_over};
 import package::transport::strategy::{eye_joins, implicit_term, light_joins};
@@ -77,7 +77,7 @@ fn scattering_side(light: ptr<function, Walk>, surface: Surface, s: u32, t: u32)
         side.end.pdf = scattered.pdf;
         side.end.segment = segment_between(surface, vertex);
         let reverse_pdf = reverse_pdf_bsdf(bsdf, outgoing, -side.end.direction);
-        side.sum = closed_sum(sums_of(light), reverse_pdf, light_joins(t - 1u), implicit_term(s + t));
+        side.sum = closed_sum(light_sums(light), reverse_pdf, light_joins(t - 1u), implicit_term(s + t));
     }
     return side;
 }
