@@ -1,7 +1,7 @@
 //! Do the parts of a variant fit? Every name that one part says must exist in the other.
 
 use super::expression;
-use super::model::{Field, Layers, Layout, Pipeline, Placed, PlacedField, Tally, Variant};
+use super::model::{Field, Fuse, Layers, Layout, Pipeline, Placed, PlacedField, Tally, Variant};
 use super::section::Findings;
 use super::suggest;
 use crate::diagnostic::Diagnostic;
@@ -24,6 +24,7 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
     for stream in &variant.schedule.batch {
         check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
     }
+    check_groups(variant, findings);
     check_tables(&variant.layout, pipeline, findings);
     check_places(&variant.layout, pipeline, findings);
 }
@@ -63,6 +64,22 @@ fn check_stages(pipeline: &Pipeline, findings: &mut Findings) {
         }
         for instance in stage.with.values() {
             check_known(("K0206", "instance"), instance, &pipeline.state, findings);
+        }
+    }
+}
+
+/// Groups of fused stages: a stage is in one of them at most.
+fn check_groups(variant: &Variant, findings: &mut Findings) {
+    let Fuse::Groups(groups) = &variant.schedule.fuse.value else { return };
+    let mut seen: IndexMap<&str, Span> = IndexMap::new();
+    for stage in groups.iter().flatten() {
+        check_known(("K0202", "stage"), stage, &variant.pipeline.stages, findings);
+        if let Some(first) = seen.insert(&stage.value, stage.span) {
+            let twice = Diagnostic::error("K0225", format!("stage `{}` is fused twice", stage.value))
+                .at(stage.span, "again here")
+                .also(first, "here already")
+                .help("name it in one group only; a group may have more than two stages");
+            findings.push(twice);
         }
     }
 }

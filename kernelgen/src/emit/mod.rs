@@ -1,7 +1,9 @@
 //! The generator's last step: modules and kernels as text, the plan, the report.
 
+mod chain;
 mod entry;
 mod film;
+mod fusion;
 mod housekeeping;
 mod kernel;
 mod memory;
@@ -65,12 +67,12 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     };
     warnings.extend(wiring.warnings.iter().cloned());
     let start = &variant.pipeline.start.value;
-    let liveness = analyze::liveness(&wiring.flow(start));
+    let liveness = analyze::liveness(&wiring.flow());
     check_initialised(&wiring, &liveness, start)?;
     let placement = layout::assign(&variant, &liveness)?;
     let queues = queues(&wiring, &variant);
     let layers = film::used(layers, &wiring.splats);
-    add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues);
+    add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues, rounds);
     add_module(sources, &mut modules, "film", film::module(variant.schedule.accumulate, &layers));
     let leaves = leaves(&variant);
     let program = Program {
@@ -133,7 +135,7 @@ fn add_config_modules(
         ("features", modules::features(&variant.effects)),
         ("params", modules::params(&pipeline.params)),
         ("pass", modules::PASS.to_owned()),
-        ("control", queue::control_module(&queues)),
+        ("control", queue::control_module(&queues, 0)),
         ("film", film::module(variant.schedule.accumulate, layers)),
         ("streams", stream::analysis_module(pipeline)),
         ("tallies", tally::module(pipeline, tallies, variant.schedule.workgroup.value)),
@@ -165,10 +167,12 @@ fn add_state_modules(
     wiring: &Wiring,
     placement: &Placement,
     queues: &Queues,
+    rounds: u32,
 ) {
     let kind = variant.schedule.queue;
     let texts = [
-        ("control", queue::control_module(queues)),
+        ("control", queue::control_module(queues, rounds)),
+        ("next", chain::module(wiring)),
         ("queue", queue::queue_module(queues, kind)),
         ("tables", memory::module(placement)),
         ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule))),
@@ -180,8 +184,8 @@ fn add_state_modules(
 
 fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
     let batched = wiring.streams.iter().filter(|(_, stream)| stream.batched);
-    let stages: Vec<String> = wiring.stages.keys().filter(|stage| wiring.is_looped(stage)).cloned().collect();
-    let mixed = |stage: &&String| variant.schedule.order == PathOrder::Slot && wiring.feeders(stage) > 1;
+    let stages: Vec<String> = wiring.fusion.queued.keys().cloned().collect();
+    let mixed = |stage: &&String| variant.schedule.order == PathOrder::Slot && wiring.fusion.feeders(stage) > 1;
     Queues {
         ordered: stages.iter().filter(mixed).cloned().collect(),
         stages,

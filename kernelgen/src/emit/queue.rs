@@ -13,10 +13,10 @@ pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
     WORDS.iter().copied().zip(0..).take(WORDS.len() - 1)
 }
 
-/// Every queue of the program: one a stage of the loop, one a batched stream.
+/// Every queue of the program: one a kernel of the loop, one a batched stream.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Queues {
-    /// Stages, in the order in which a round runs them.
+    /// Stages that kernels of the loop begin with, in the order in which a round runs them.
     pub stages: Vec<String>,
     /// Those of them that take their paths in the order of slots.
     pub ordered: Vec<String>,
@@ -55,7 +55,7 @@ impl Queues {
 }
 
 /// `package::control`: counters that kernels and host share.
-pub(super) fn control_module(queues: &Queues) -> String {
+pub(super) fn control_module(queues: &Queues, rounds: u32) -> String {
     let mut text = String::new();
     for (name, word) in WORDS.iter().zip(0..) {
         let _ = writeln!(text, "const CONTROL_{}: u32 = {word}u;", name.to_uppercase());
@@ -64,6 +64,8 @@ pub(super) fn control_module(queues: &Queues) -> String {
         text,
         "/// Words in all.\n\
          const CONTROL_WORDS: u32 = {}u;\n\n\
+         /// Rounds after which no path may be alive.\n\
+         const ROUNDS: u32 = {rounds}u;\n\n\
          /// Counters of a pass, then two words a queue: how many wait in it, how many its running kernel takes.\n\
          var<storage, read_write> control: array<atomic<u32>>;\n\n\
          /// The word that counts what waits in a queue.\n\
@@ -78,6 +80,7 @@ pub(super) fn control_module(queues: &Queues) -> String {
     );
     text.push_str(COUNT_WALK_RAYS);
     text.push_str(COUNT_RAY);
+    text.push_str(FUSED);
     text
 }
 
@@ -96,6 +99,43 @@ const COUNT_RAY: &str = r"
 /// Counts one ray of this invocation.
 fn count_ray(word: u32) {
     atomicAdd(&control[word], 1u);
+}
+";
+
+/// What kernels of several stages count by themselves: nobody else knows what happens in them.
+const FUSED: &str = r"
+/// How many rounds have begun.
+fn rounds_begun() -> u32 {
+    return atomicLoad(&control[CONTROL_ROUND]);
+}
+
+/// A walk ray of a round: primary, secondary, deep and visibility rays.
+fn walk_ray(round: u32) -> vec4u {
+    return vec4u(vec3<u32>(vec3<bool>(round <= 1u, round == 2u, round > 2u)), 0u);
+}
+
+/// Rays of this workgroup.
+var<workgroup> rays_share: array<atomic<u32>, 4>;
+
+/// Adds rays, with one atomic a workgroup; `lane` numbers its invocations, which must all call it.
+fn add_rays(rays: vec4u, lane: u32) {
+    for (var kind = 0u; kind < 4u; kind += 1u) {
+        if rays[kind] > 0u {
+            atomicAdd(&rays_share[kind], rays[kind]);
+        }
+    }
+    workgroupBarrier();
+    if lane < 4u {
+        let counted = atomicLoad(&rays_share[lane]);
+        if counted > 0u {
+            atomicAdd(&control[CONTROL_RAYS_PRIMARY + lane], counted);
+        }
+    }
+}
+
+/// Counts a path that is given up.
+fn count_unfinished() {
+    atomicAdd(&control[CONTROL_UNFINISHED], 1u);
 }
 ";
 
