@@ -292,6 +292,8 @@ pub enum QueueKind {
     Subgroup,
     /// One atomic a workgroup; survivors keep their order in it.
     Workgroup,
+    /// There are no queues: every kernel looks at every slot, and takes the paths that wait for it.
+    None,
 }
 
 /// In what order stages take their paths.

@@ -26,7 +26,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         Some(item) => fuse(&item, findings),
         None => Some(Spanned { value: Fuse::Groups(Vec::new()), span: section.span }),
     };
-    let queue = word(&section, "queue", &["atomic", "subgroup", "workgroup"], findings);
+    let queue = word(&section, "queue", &["atomic", "subgroup", "workgroup", "none"], findings);
     let workgroup = section.require("workgroup", "threads in a workgroup: `workgroup = 64`", findings);
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
@@ -38,7 +38,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         name: file.name.clone(),
         doc: file.doc.clone(),
         fuse: fuse?,
-        queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup][queue?],
+        queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup, QueueKind::None][queue?],
         order: [PathOrder::Arrival, PathOrder::Slot][order.unwrap_or_default()],
         workgroup: workgroup?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],

@@ -4,6 +4,7 @@ use super::memory::Access;
 use super::queue::Queues;
 use super::text::{Imports, PARAMETERS, stage_constant, stream_constant};
 use super::wiring::{WiredStage, WiredStream};
+use crate::config::model::QueueKind;
 use indexmap::IndexMap;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -109,6 +110,11 @@ impl Frame<'_> {
             Source::Slots => {
                 imports.add("pass", ["pass_info"]);
                 ("index < pass_info.slots".to_owned(), "index".to_owned())
+            }
+            Source::Queue if self.queues.kind == QueueKind::None => {
+                let constant = stage_constant(self.entry);
+                imports.add("queue", ["takes", constant.as_str()]);
+                (format!("takes({constant}, index)"), "index".to_owned())
             }
             Source::Queue => {
                 let constant = stage_constant(self.entry);

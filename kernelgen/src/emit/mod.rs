@@ -22,7 +22,7 @@ mod wiring;
 use crate::analyze::{self, Leaf, Liveness};
 use crate::config;
 use crate::config::evaluate_rounds;
-use crate::config::model::{PathOrder, Selection, Variant};
+use crate::config::model::{PathOrder, QueueKind, Selection, Variant};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::layout::{self, Placement, StateLeaf};
 use crate::link::Modules;
@@ -127,7 +127,7 @@ fn add_config_modules(
     let outcomes = modules::outcome_names(pipeline, &imported_outcomes(sources, modules, variant));
     let state = modules::state(pipeline)?;
     // Stages are analysed against counters and queues of no stage: which there are follows from the analysis.
-    let queues = Queues { workgroup: variant.schedule.workgroup.value, ..Queues::default() };
+    let queues = Queues::none(variant.schedule.workgroup.value);
     let texts = [
         ("real", modules::real(variant.precision.real)),
         ("state", state),
@@ -169,11 +169,10 @@ fn add_state_modules(
     queues: &Queues,
     rounds: u32,
 ) {
-    let kind = variant.schedule.queue;
     let texts = [
         ("control", queue::control_module(queues, rounds)),
         ("next", chain::module(wiring)),
-        ("queue", queue::queue_module(queues, kind)),
+        ("queue", queue::queue_module(queues)),
         ("tables", memory::module(placement)),
         ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule))),
     ];
@@ -185,11 +184,14 @@ fn add_state_modules(
 fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
     let batched = wiring.streams.iter().filter(|(_, stream)| stream.batched);
     let stages: Vec<String> = wiring.fusion.queued.keys().cloned().collect();
-    let mixed = |stage: &&String| variant.schedule.order == PathOrder::Slot && wiring.fusion.feeders(stage) > 1;
+    let kind = variant.schedule.queue;
+    let sorts = variant.schedule.order == PathOrder::Slot && kind != QueueKind::None;
+    let mixed = |stage: &&String| sorts && wiring.fusion.feeders(stage) > 1;
     Queues {
         ordered: stages.iter().filter(mixed).cloned().collect(),
         stages,
         streams: batched.map(|(name, _)| name.clone()).collect(),
+        kind,
         workgroup: variant.schedule.workgroup.value,
     }
 }

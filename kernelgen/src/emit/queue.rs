@@ -14,7 +14,7 @@ pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
 }
 
 /// Every queue of the program: one a kernel of the loop, one a batched stream.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Queues {
     /// Stages that kernels of the loop begin with, in the order in which a round runs them.
     pub stages: Vec<String>,
@@ -22,11 +22,19 @@ pub(super) struct Queues {
     pub ordered: Vec<String>,
     /// Batched streams.
     pub streams: Vec<String>,
+    /// How a path finds its place; with `None`, paths are marked instead.
+    pub kind: QueueKind,
     /// Threads in a workgroup of the kernels that take from them.
     pub workgroup: u32,
 }
 
 impl Queues {
+    /// No queue.
+    pub(super) fn none(workgroup: u32) -> Queues {
+        let (stages, ordered, streams) = (Vec::new(), Vec::new(), Vec::new());
+        Queues { stages, ordered, streams, kind: QueueKind::None, workgroup }
+    }
+
     /// Queues in all.
     pub(super) fn count(&self) -> u32 {
         (self.stages.len() + self.streams.len()) as u32
@@ -140,7 +148,8 @@ fn count_unfinished() {
 ";
 
 /// `package::queue`: how paths wait for stages.
-pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
+pub(super) fn queue_module(queues: &Queues) -> String {
+    let kind = queues.kind;
     let mut text = String::from(
         "import package::control::{control, waiting, waiting_word};\n\
          import package::pass::{path_count, pass_info};\n\n",
@@ -164,14 +173,21 @@ pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
         QueueKind::Atomic => ENQUEUE_ATOMIC,
         QueueKind::Subgroup => ENQUEUE_SUBGROUP,
         QueueKind::Workgroup => ENQUEUE_WORKGROUP,
+        QueueKind::None => MARK,
     });
     if !queues.ordered.is_empty() {
         text.push_str(ORDER);
     }
     text.push_str(APPEND);
+    let threads = match kind {
+        QueueKind::None => {
+            format!("select(entries, pass_info.slots, entries > 0u && number < {}u)", queues.stages.len())
+        }
+        _ => "entries".to_owned(),
+    };
     let _ = write!(
         text,
-        "{START_QUEUE}    let groups = (entries + {}u) / {}u;{SIZE_DISPATCH_END}",
+        "{START_QUEUE}    let groups = ({threads} + {}u) / {}u;{SIZE_DISPATCH_END}",
         queues.workgroup - 1,
         queues.workgroup
     );
@@ -257,6 +273,42 @@ const ENQUEUE_WORKGROUP: &str = r"
 /// To be called by all invocations of a workgroup.
 fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
     place_side_by_side(number, waiting_word(number), wanted, path, lane);
+}
+";
+
+/// Dispatches of stages have an invocation for every slot then, or none where no path waits.
+const MARK: &str = r"
+/// The stage that a path waits for, its number plus one; 0: none.
+var<storage, read_write> waits_for: array<u32>;
+
+/// Paths of this workgroup that a stage gets.
+var<workgroup> arrivals: atomic<u32>;
+
+/// Lets this path wait for a stage where `wanted`, and counts how many do, with one atomic a workgroup; `lane` numbers its
+/// invocations, which must all call it.
+fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
+    if lane == 0u {
+        atomicStore(&arrivals, 0u);
+    }
+    workgroupBarrier();
+    if wanted {
+        waits_for[path] = number + 1u;
+        atomicAdd(&arrivals, 1u);
+    }
+    workgroupBarrier();
+    if lane == 0u && atomicLoad(&arrivals) > 0u {
+        atomicAdd(&control[waiting_word(number)], atomicLoad(&arrivals));
+    }
+    workgroupBarrier();
+}
+
+/// Whether the path of a slot waits for a stage, which takes it then.
+fn takes(number: u32, path: u32) -> bool {
+    if path >= pass_info.slots || waits_for[path] != number + 1u {
+        return false;
+    }
+    waits_for[path] = 0u;
+    return true;
 }
 ";
 

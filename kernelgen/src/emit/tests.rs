@@ -322,6 +322,21 @@ fn paths_that_come_from_several_stages_are_put_in_order() {
     assert!(kernel(&plan, "prepare_trace").module.contains("open_order(QUEUE_TRACE);"));
 }
 
+/// Every slot is looked at, and only where a path waits for the kernel at all.
+#[test]
+fn without_queues_paths_are_marked() {
+    let plan = generated(&[("schedule.queue", "none"), ("schedule.order", "slot")]).plan;
+    let trace = &kernel(&plan, "trace").module;
+    assert!(trace.contains("if takes(QUEUE_TRACE, index) {\n        path_id = index;"), "{trace}");
+    assert!(trace.contains("waits_for[path] = number + 1u;") && !trace.contains("subgroup"), "{trace}");
+    let prepare = &kernel(&plan, "prepare_trace").module;
+    assert!(prepare.contains("select(entries, pass_info.slots, entries > 0u && number < 2u)"), "{prepare}");
+    let queues: Vec<&str> =
+        plan.buffers.iter().filter(|buffer| buffer.role == Role::Queue).map(|buffer| buffer.name.as_str()).collect();
+    assert_eq!(queues, ["waits_for"]);
+    assert!(plan.kernels.iter().all(|kernel| !kernel.name.starts_with("order_")));
+}
+
 #[test]
 fn paths_that_come_from_one_stage_are_not_put_in_order() {
     for plan in [generated(&[("schedule.order", "slot")]).plan, with_two_feeders("arrival")] {
