@@ -151,13 +151,13 @@ pub struct Kernel {
     pub bindings: Vec<Binding>,
     /// Threads in a workgroup.
     pub workgroup: u32,
-    /// Stages inside; empty for the generated housekeeping kernels.
+    /// Stages inside, the one that it begins with first; empty for the generated housekeeping kernels.
     pub stages: Vec<String>,
     /// Bytes of path state that a path loads.
     pub load_bytes: u32,
     /// Bytes of path state that a path stores.
     pub store_bytes: u32,
-    /// What its rays are counted as.
+    /// What its rays are counted as; none where it has several stages, which count by themselves.
     pub rays: Option<RayKind>,
 }
 

@@ -83,7 +83,7 @@ pub struct Place {
 pub struct KernelReport {
     /// Its name.
     pub name: String,
-    /// Its stages; none for housekeeping and for stream consumers.
+    /// Its stages, the one that it begins with first; none for housekeeping and for stream consumers.
     pub stages: Vec<String>,
     /// Bytes of state that a path loads.
     pub load_bytes: u32,
@@ -128,6 +128,8 @@ struct FieldUse {
     stored: Option<String>,
     shares: Vec<String>,
     dead: Option<String>,
+    /// Whether kernels use it without any storage.
+    transient: bool,
 }
 
 /// What a report is made of.
@@ -220,8 +222,7 @@ fn codec(leaf: &StateLeaf) -> String {
 
 fn kernels(findings: &Findings<'_>) -> Vec<KernelReport> {
     let report = |kernel: &crate::plan::Kernel| {
-        let traffic = kernel.stages.iter().filter_map(|stage| findings.liveness.kernels.get(stage));
-        let traffic: Vec<_> = traffic.collect();
+        let traffic = kernel.stages.first().and_then(|entry| findings.liveness.kernels.get(entry));
         let names = |leaves: &BTreeSet<Leaf>| leaves.iter().map(Leaf::to_string).collect::<Vec<_>>();
         KernelReport {
             name: kernel.name.clone(),
@@ -276,8 +277,12 @@ fn field_use(findings: &Findings<'_>, declared: &StateLeaf) -> FieldUse {
         stored: findings.placement.slots.get(leaf).map(|slot| stored(findings.placement, slot)),
         shares: findings.placement.shares(leaf).into_iter().map(Leaf::to_string).collect(),
         dead: findings.liveness.dead.get(leaf).cloned(),
+        transient: dead(findings, declared).is_some_and(|reason| reason.reason == TRANSIENT),
     }
 }
+
+/// Why a leaf that is read and written needs no storage.
+const TRANSIENT: &str = "lives within one kernel";
 
 /// Why a leaf that is stored nowhere needs no storage.
 fn dead(findings: &Findings<'_>, declared: &StateLeaf) -> Option<Reason> {
@@ -290,7 +295,7 @@ fn dead(findings: &Findings<'_>, declared: &StateLeaf) -> Option<Reason> {
     };
     let reason = match findings.liveness.dead.get(leaf) {
         Some(reason) => reason.clone(),
-        None if findings.stages.iter().any(|(_, facts)| touches(facts)) => "lives within one kernel".to_owned(),
+        None if findings.stages.iter().any(|(_, facts)| touches(facts)) => TRANSIENT.to_owned(),
         None => "no stage reads or writes it".to_owned(),
     };
     Some(Reason { name: leaf.to_string(), reason })
@@ -356,9 +361,12 @@ impl Report {
     fn kernel_rows(&self) -> Vec<Vec<String>> {
         let mut rows = vec![["kernel", "loads B", "stores B"].map(str::to_owned).to_vec()];
         let stages = self.kernels.iter().filter(|kernel| !kernel.stages.is_empty());
+        let name = |kernel: &KernelReport| match kernel.stages.get(1..) {
+            Some(others @ [_, ..]) => format!("{} with {}", kernel.name, others.join(", ")),
+            _ => kernel.name.clone(),
+        };
         rows.extend(
-            stages
-                .map(|kernel| vec![kernel.name.clone(), kernel.load_bytes.to_string(), kernel.store_bytes.to_string()]),
+            stages.map(|kernel| vec![name(kernel), kernel.load_bytes.to_string(), kernel.store_bytes.to_string()]),
         );
         rows
     }
@@ -408,6 +416,9 @@ fn push_use(text: &mut String, indent: &str, leaf: &FieldUse) {
     }
     if let Some(reason) = &leaf.dead {
         let _ = writeln!(text, "{indent}dead: {reason}");
+    }
+    if leaf.transient {
+        let _ = writeln!(text, "{indent}not stored: {TRANSIENT}");
     }
 }
 

@@ -66,6 +66,8 @@ pub struct Rendering {
     pub rejected: u64,
     /// Rays of all kinds.
     pub rays: u64,
+    /// Primary, secondary and deep rays among them.
+    pub walk_rays: [u64; 3],
     /// Visibility rays among them.
     pub visibility: u64,
     /// Sums of a fixed-point film: what must be equal bit for bit where images must be. Empty for other films.
@@ -242,6 +244,7 @@ fn rendering(rendered: &Rendered) -> Rendering {
         pixels: pixels(rendered.size, &rendered.mean, rendered.standard_error.as_ref().unwrap_or(&unknown)),
         rejected: counters.rejected,
         rays: counters.primary + counters.secondary + counters.deep + counters.visibility,
+        walk_rays: [counters.primary, counters.secondary, counters.deep],
         visibility: counters.visibility,
         sums: match &rendered.totals.sums {
             Sums::Fixed(units) => units.clone(),

@@ -2,13 +2,13 @@
 
 use super::constant::{Scalar, Values};
 use super::place::Leaves;
-use super::walk::{Argument, Walk};
+use super::walk::{Argument, Exit, Walk};
 use super::{Leaf, StageFacts, place_of};
 use crate::diagnostic::Diagnostic;
 use crate::link::Linked;
 use crate::source::Span;
 use naga::{AddressSpace, Function, Handle, Module, Type, TypeInner};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What the stage function of this name does.
 ///
@@ -33,9 +33,12 @@ pub fn stage_facts(
     let mut walk = Walk::new(module, linked, leaves);
     let arguments = (0..stage.arguments.len()).map(Argument::record).collect();
     let end = walk.stage(handle, arguments);
-    let outcomes = match stage.result {
-        Some(_) => named_outcomes(&end.exits, linked, function, outcomes)?,
-        None => BTreeMap::new(),
+    let (returned, written_by_outcome) = match stage.result {
+        Some(_) => (
+            named_outcomes(&end.exits, linked, function, outcomes)?,
+            written_by_outcome(&end.exits, &walk.leaves, outcomes),
+        ),
+        None => Default::default(),
     };
     let leaf = |(index, span): (&usize, &Span)| (walk.leaves.get(*index).clone(), *span);
     let written: BTreeMap<Leaf, Span> = walk.stored.iter().map(leaf).collect();
@@ -45,7 +48,8 @@ pub fn stage_facts(
         reads: walk.read.iter().map(leaf).collect(),
         writes,
         maybe,
-        outcomes,
+        outcomes: returned,
+        written_by_outcome,
         pushes: end.pushes,
         params,
         globals: walk.globals,
@@ -101,15 +105,32 @@ fn record_of(module: &Module, ty: Handle<Type>) -> Option<Handle<Type>> {
     }
 }
 
+/// What is written at every return that may return an outcome.
+fn written_by_outcome(
+    exits: &[Exit],
+    leaves: &Leaves,
+    names: &BTreeMap<u32, String>,
+) -> BTreeMap<String, BTreeSet<Leaf>> {
+    let mut written: BTreeMap<String, BTreeSet<Leaf>> = BTreeMap::new();
+    for exit in exits {
+        let Values::Known(values) = &exit.values else { continue };
+        let here: BTreeSet<Leaf> = exit.written.iter().map(|&index| leaves.get(index).clone()).collect();
+        for name in values.iter().filter_map(|value| name_of(*value, names)) {
+            written.entry(name).or_insert_with(|| here.clone()).retain(|leaf| here.contains(leaf));
+        }
+    }
+    written
+}
+
 fn named_outcomes(
-    exits: &[(naga::Span, Values)],
+    exits: &[Exit],
     linked: &Linked,
     function: &str,
     names: &BTreeMap<u32, String>,
 ) -> Result<BTreeMap<String, Span>, Vec<Diagnostic>> {
     let mut outcomes = BTreeMap::new();
     let mut diagnostics = Vec::new();
-    for (span, values) in exits {
+    for Exit { span, values, .. } in exits {
         let place = place_of(*span, linked);
         let Values::Known(values) = values else {
             diagnostics.push(no_outcome(function, "something that is computed".into(), place));

@@ -53,12 +53,22 @@ pub struct StageFacts {
     pub maybe: BTreeMap<Leaf, Span>,
     /// Outcome names (lower case) that reach a return, with the place of one such return.
     pub outcomes: BTreeMap<String, Span>,
+    /// What is surely written where an outcome is returned: more than `writes` where other returns write less.
+    pub written_by_outcome: BTreeMap<String, BTreeSet<Leaf>>,
     /// Most pushes of one invocation to each stream (calls of `push_<stream>`; in a loop: `None`).
     pub pushes: BTreeMap<String, Option<u32>>,
     /// Parameter names in order, with the record type's name.
     pub params: Vec<(String, String)>,
     /// Names of the globals (bindings) that live code uses.
     pub globals: BTreeSet<String>,
+}
+
+impl StageFacts {
+    /// What is surely written when one of these outcomes has been returned.
+    pub fn written_with(&self, outcomes: impl IntoIterator<Item = String>) -> BTreeSet<Leaf> {
+        let written = outcomes.into_iter().filter_map(|outcome| self.written_by_outcome.get(&outcome).cloned());
+        written.reduce(|left, right| left.intersection(&right).cloned().collect()).unwrap_or_default()
+    }
 }
 
 /// The author's place of something in linked text.

@@ -69,6 +69,22 @@ fn reads_count_until_the_leaf_is_written() {
 }
 
 #[test]
+fn what_is_written_depends_on_the_outcome() {
+    let facts = facts(
+        "fn f(walk: ptr<function, Walk>) -> u32 { walk.pdf = 1.0; if data[0] > 0.0 { return MISS; } walk.depth = 1u; \
+         if data[1] > 0.0 { walk.hit.t = 1.0; return HIT; } return select(HIT, MISS, data[2] > 0.0); }",
+    );
+    let written = |outcomes: &[&str]| {
+        let leaves = facts.written_with(outcomes.iter().map(|outcome| outcome.to_string()));
+        leaves.iter().map(Leaf::to_string).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(written(&["hit"]), "eye.depth eye.pdf");
+    assert_eq!(written(&["miss"]), "eye.pdf");
+    assert_eq!(written(&["hit", "miss"]), "eye.pdf");
+    assert_eq!(names(&facts.maybe), "eye.depth eye.hit.t");
+}
+
+#[test]
 fn branches_make_writes_possible_or_sure() {
     assert_eq!(of("if walk.pdf > 0.0 { walk.depth = 1u; }"), ["eye.pdf", "", "eye.depth"]);
     assert_eq!(of("if data[0] > 0.0 { walk.depth = 1u; } else { walk.depth = 2u; }"), ["", "eye.depth", ""]);

@@ -42,8 +42,19 @@ pub(super) struct End {
     pub written: BTreeSet<usize>,
     /// Most pushes to each stream.
     pub pushes: Pushes,
-    /// The value of every return, with its place in the linked text.
-    pub exits: Vec<(naga::Span, Values)>,
+    /// Every return of a value.
+    pub exits: Vec<Exit>,
+}
+
+/// A return.
+#[derive(Debug)]
+pub(super) struct Exit {
+    /// Its place in the linked text.
+    pub span: naga::Span,
+    /// What it may return.
+    pub values: Values,
+    /// Leaves surely written there.
+    pub written: BTreeSet<usize>,
 }
 
 /// What a call did that needed nothing of its caller's state.
@@ -65,7 +76,7 @@ struct Frame<'m> {
     /// What holds at its returns so far.
     returned: Option<State>,
     result: Values,
-    exits: Vec<(naga::Span, Values)>,
+    exits: Vec<Exit>,
 }
 
 /// Ways that left a loop or a switch, or went on to its next round.
@@ -189,7 +200,7 @@ impl<'m> Walk<'m> {
             }
             Statement::Return { value } => {
                 if let Some(value) = value {
-                    self.exit(frame, *value, span);
+                    self.exit(frame, *value, span, &state);
                 }
                 frame.returned = join(frame.returned.take(), Some(state));
                 return None;
@@ -218,10 +229,11 @@ impl<'m> Walk<'m> {
         Some(state)
     }
 
-    fn exit(&mut self, frame: &mut Frame<'m>, value: Handle<Expression>, span: naga::Span) {
+    fn exit(&mut self, frame: &mut Frame<'m>, value: Handle<Expression>, span: naga::Span, state: &State) {
         let values = self.evaluate(frame, value);
         let place = frame.function.expressions.get_span(value);
-        frame.exits.push((if place.is_defined() { place } else { span }, values.clone()));
+        let span = if place.is_defined() { place } else { span };
+        frame.exits.push(Exit { span, values: values.clone(), written: state.written.clone() });
         frame.result = std::mem::replace(&mut frame.result, Values::none()).join(values);
     }
 

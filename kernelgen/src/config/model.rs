@@ -300,6 +300,8 @@ pub struct Schedule {
     pub name: String,
     /// One line about it.
     pub doc: String,
+    /// Which stages share a kernel.
+    pub fuse: Spanned<Fuse>,
     /// How a survivor finds its place in the next queue.
     pub queue: QueueKind,
     /// In what order stages take their paths.
@@ -314,6 +316,17 @@ pub struct Schedule {
     pub capacity: Spanned<f64>,
 }
 
+/// Which stages share a kernel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Fuse {
+    /// Those of each group; a stage in no group is a kernel of its own. `fuse = []`: all are.
+    Groups(Vec<Vec<Spanned<String>>>),
+    /// Each stage that traces walk rays and the stages that its outcomes lead to: `fuse = "walks"`.
+    Walks,
+    /// All: `fuse = "all"`, a megakernel.
+    All,
+}
+
 /// How a survivor finds its place in a queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -324,6 +337,8 @@ pub enum QueueKind {
     Subgroup,
     /// One atomic a workgroup; survivors keep their order in it.
     Workgroup,
+    /// There are no queues: every kernel looks at every slot, and takes the paths that wait for it.
+    None,
 }
 
 /// In what order stages take their paths.

@@ -1,7 +1,7 @@
 //! The schedule axis and the precision axis.
 
 use super::merge::AxisFile;
-use super::model::{Accumulate, PathOrder, Precision, QueueKind, Real, Schedule};
+use super::model::{Accumulate, Fuse, PathOrder, Precision, QueueKind, Real, Schedule};
 use super::section::{Findings, Item, Section};
 use super::tree::Data;
 use crate::diagnostic::Diagnostic;
@@ -22,7 +22,11 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let section = top.require("schedule", "write `[schedule]`", findings)?.section(findings)?;
     section.allow(&KEYS, findings);
     check_fixed(&section, findings);
-    let queue = word(&section, "queue", &["atomic", "subgroup", "workgroup"], findings);
+    let fuse = match section.get("fuse") {
+        Some(item) => fuse(&item, findings),
+        None => Some(Spanned { value: Fuse::Groups(Vec::new()), span: section.span }),
+    };
+    let queue = word(&section, "queue", &["atomic", "subgroup", "workgroup", "none"], findings);
     let workgroup = section.require("workgroup", "threads in a workgroup: `workgroup = 64`", findings);
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
@@ -33,7 +37,8 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     Some(Schedule {
         name: file.name.clone(),
         doc: file.doc.clone(),
-        queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup][queue?],
+        fuse: fuse?,
+        queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup, QueueKind::None][queue?],
         order: [PathOrder::Arrival, PathOrder::Slot][order.unwrap_or_default()],
         workgroup: workgroup?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
@@ -64,13 +69,15 @@ fn check_fixed(section: &Section<'_>, findings: &mut Findings) {
     if let Some(until) = section.get("until") {
         until.word(&["empty"], findings);
     }
-    let fuse = section.get("fuse");
-    if let Some(fuse) = fuse.filter(|fuse| !matches!(&fuse.node.data, Data::List(list) if list.is_empty())) {
-        let fused = Diagnostic::error("K0107", "stages cannot be fused yet")
-            .at(fuse.span(), "only `[]`, every stage a kernel of its own, is available")
-            .help("write `fuse = []`");
-        findings.push(fused);
-    }
+}
+
+/// A word, or groups of stages as lists of their names.
+fn fuse(item: &Item<'_>, findings: &mut Findings) -> Option<Spanned<Fuse>> {
+    let value = match item.node.data {
+        Data::List(_) => Fuse::Groups(item.list(findings)?.iter().filter_map(|group| group.texts(findings)).collect()),
+        _ => [Fuse::Walks, Fuse::All][item.word(&["walks", "all"], findings)?].clone(),
+    };
+    Some(Spanned { value, span: item.span() })
 }
 
 fn workgroup_size(item: &Item<'_>, findings: &mut Findings) -> Option<Spanned<u32>> {

@@ -2,7 +2,7 @@
 
 use super::encode;
 use super::expression;
-use super::model::{Field, Layers, Layout, OPTIONAL, Pipeline, Placed, PlacedField, Tally, Variant};
+use super::model::{Field, Fuse, Layers, Layout, OPTIONAL, Pipeline, Placed, PlacedField, Tally, Variant};
 use super::section::Findings;
 use super::suggest;
 use crate::diagnostic::Diagnostic;
@@ -25,6 +25,7 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
     for stream in &variant.schedule.batch {
         check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
     }
+    check_groups(variant, findings);
     check_tables(&variant.layout, pipeline, findings);
     check_places(&variant.layout, pipeline, findings);
     encode::check(variant, findings);
@@ -65,6 +66,22 @@ fn check_stages(pipeline: &Pipeline, findings: &mut Findings) {
         }
         for instance in stage.with.values() {
             check_known(("K0206", "instance"), instance, &pipeline.state, findings);
+        }
+    }
+}
+
+/// Groups of fused stages: a stage is in one of them at most.
+fn check_groups(variant: &Variant, findings: &mut Findings) {
+    let Fuse::Groups(groups) = &variant.schedule.fuse.value else { return };
+    let mut seen: IndexMap<&str, Span> = IndexMap::new();
+    for stage in groups.iter().flatten() {
+        check_known(("K0202", "stage"), stage, &variant.pipeline.stages, findings);
+        if let Some(first) = seen.insert(&stage.value, stage.span) {
+            let twice = Diagnostic::error("K0225", format!("stage `{}` is fused twice", stage.value))
+                .at(stage.span, "again here")
+                .also(first, "here already")
+                .help("name it in one group only; a group may have more than two stages");
+            findings.push(twice);
         }
     }
 }

@@ -7,7 +7,8 @@ use crate::config::model::RayKind;
 use indexmap::IndexMap;
 use std::fmt::Write;
 
-/// The kernel that zeroes the control buffer. Rays of the start stage, which takes every slot, are counted here.
+/// The kernel that zeroes the control buffer. Rays of a start stage with a kernel of its own, which takes every
+/// slot, are counted here.
 pub(super) fn begin_kernel(start_rays: Option<RayKind>) -> String {
     let mut imports = Imports::default();
     imports.add("control", ["control", "CONTROL_WORDS"]);
@@ -166,19 +167,26 @@ pub(super) fn order_kernel(name: &str, stage: &str, workgroup: u32) -> String {
 /// The kernel after the loop: whatever path still waits was cut off, and what is left in the streams is handed to their consumers.
 pub(super) fn finish_kernel(queues: &Queues, streams: &[Prepared]) -> String {
     let mut imports = Imports::default();
-    imports.add("control", ["control", "waiting", "CONTROL_UNFINISHED"]);
-    let body: String = streams.iter().map(|prepared| prepared.statements(&mut imports)).collect();
+    let mut body = String::new();
+    if !queues.stages.is_empty() {
+        imports.add("control", ["control", "waiting", "CONTROL_UNFINISHED"]);
+        let _ = write!(
+            body,
+            "    var left = 0u;\n    \
+                 for (var number = 0u; number < {}u; number += 1u) {{\n        \
+                     left += waiting(number);\n    \
+                 }}\n    \
+                 atomicAdd(&control[CONTROL_UNFINISHED], left);\n",
+            queues.stages.len()
+        );
+    }
+    for prepared in streams {
+        body.push_str(&prepared.statements(&mut imports));
+    }
     format!(
         "{imports}\n\
          /// Counts the paths that still wait: more than none means that the rounds did not suffice. Then empties the streams.\n\
          @compute @workgroup_size(1)\n\
-         fn finish_main() {{\n    \
-             var left = 0u;\n    \
-             for (var number = 0u; number < {}u; number += 1u) {{\n        \
-                 left += waiting(number);\n    \
-             }}\n    \
-             atomicStore(&control[CONTROL_UNFINISHED], left);\n\
-         {body}}}\n",
-        queues.stages.len()
+         fn finish_main() {{\n{body}}}\n"
     )
 }

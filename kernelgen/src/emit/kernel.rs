@@ -4,6 +4,7 @@ use super::memory::Access;
 use super::queue::Queues;
 use super::text::{Imports, PARAMETERS, stage_constant, stream_constant};
 use super::wiring::{WiredStage, WiredStream};
+use crate::config::model::QueueKind;
 use indexmap::IndexMap;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -17,75 +18,125 @@ pub(super) enum Source {
     Queue,
 }
 
-/// The kernel of a stage: load, call, store, enqueue.
-pub(super) fn stage_kernel(
-    kernel: &str,
-    name: &str,
-    stage: &WiredStage,
-    source: Source,
-    queues: &Queues,
-    access: &Access,
-) -> String {
-    let workgroup = queues.workgroup;
-    let mut imports = Imports::default();
-    imports.add(&stage.entry.module, [stage.entry.name.as_str()]);
-    imports.add("pass", ["path_id"]);
-    let condition = match source {
-        Source::Slots => {
-            imports.add("pass", ["pass_info"]);
-            "index < pass_info.slots".to_owned()
-        }
-        Source::Queue => {
-            let constant = stage_constant(name);
-            imports.add("pass", ["path_count"]);
-            imports.add("control", ["running"]);
-            imports.add("queue", ["queue", constant.as_str()]);
-            format!("index < running({constant})")
-        }
-    };
-    let path = match source {
-        Source::Slots => "index".to_owned(),
-        Source::Queue => format!("queue[{} * path_count + index]", stage_constant(name)),
-    };
-    for buffer in &access.buffers {
-        imports.add("tables", [buffer.as_str(), format!("{buffer}_address").as_str()]);
-    }
-    for (codec, function) in &access.codecs {
-        imports.add(&format!("codec::{codec}"), [function.as_str()]);
-    }
-    let call = call(stage);
-    let enqueue = enqueue(stage, queues, &mut imports);
-    let mut text = String::new();
-    let _ = write!(
-        text,
-        "/// Stage `{name}` of a path: {} bytes of state in, {} out.\n\
-         @compute @workgroup_size({workgroup})\n\
-         fn {kernel}_main{PARAMETERS} {{\n    \
-             let index = (group.y * groups.x + group.x) * {workgroup}u + lane;\n",
-        access.load_bytes, access.store_bytes
-    );
-    if !stage.routes.is_empty() {
-        imports.add("outcome", ["END"]);
-        text.push_str("    var outcome = END;\n");
-    }
-    let _ = write!(text, "    if {condition} {{\n        path_id = {path};\n");
-    push_instances(&mut text, stage, access, &mut imports);
-    let _ = write!(text, "\n        {call}\n");
-    if !access.stores.is_empty() {
-        text.push('\n');
-    }
-    for store in &access.stores {
-        let _ = writeln!(text, "        {store}");
-    }
-    let _ = write!(text, "    }}\n{enqueue}{}}}\n", add_tallies(stage.counts, &mut imports));
-    format!("{imports}\n{text}")
+/// The frame of a kernel over paths.
+#[derive(Clone, Copy)]
+pub(super) struct Frame<'a> {
+    pub kernel: &'a str,
+    /// The stage that its paths wait for.
+    pub entry: &'a str,
+    pub source: Source,
+    pub queues: &'a Queues,
+    pub access: &'a Access,
 }
 
-fn push_instances(text: &mut String, stage: &WiredStage, access: &Access, imports: &mut Imports) {
-    if !stage.instances.is_empty() {
+/// What a frame is filled with.
+#[derive(Default)]
+pub(super) struct Filling {
+    pub imports: Imports,
+    /// What the kernel is, for its comment.
+    pub heading: String,
+    /// Lines before it is known whether there is a path.
+    pub locals: String,
+    /// Instances with their records.
+    pub instances: IndexMap<String, String>,
+    /// Lines between loads and stores.
+    pub body: String,
+    /// The stages that wait for paths of this kernel, and the condition on which a path goes there.
+    pub targets: Vec<(String, String)>,
+    /// Lines that all invocations reach.
+    pub end: String,
+    /// Whether a stage counts something in a tally.
+    pub counts: bool,
+}
+
+/// The kernel of one stage: load, call, store, enqueue.
+pub(super) fn stage_kernel(frame: Frame<'_>, stage: &WiredStage) -> String {
+    let mut filling = Filling {
+        heading: format!("Stage `{}`", frame.entry),
+        instances: stage.instances.iter().cloned().collect(),
+        targets: targets(stage),
+        counts: stage.counts,
+        ..Filling::default()
+    };
+    filling.imports.add(&stage.entry.module, [stage.entry.name.as_str()]);
+    let mut result = "_";
+    if !stage.routes.is_empty() {
+        filling.imports.add("outcome", ["END"]);
+        filling.imports.add("outcome", outcomes(stage).iter().map(String::as_str));
+        filling.locals = "    var outcome = END;\n".to_owned();
+        result = "outcome";
+    }
+    filling.body = format!("        {result} = {};\n", call(stage));
+    frame.fill(filling)
+}
+
+impl Frame<'_> {
+    /// The whole text.
+    pub(super) fn fill(self, filling: Filling) -> String {
+        let Frame { kernel, queues, access, .. } = self;
+        let Filling { mut imports, heading, locals, instances, body, targets, end, counts } = filling;
+        let workgroup = queues.workgroup;
+        let (condition, path) = self.path(&mut imports);
+        for buffer in &access.buffers {
+            imports.add("tables", [buffer.as_str(), format!("{buffer}_address").as_str()]);
+        }
+        for (codec, function) in &access.codecs {
+            imports.add(&format!("codec::{codec}"), [function.as_str()]);
+        }
+        let enqueue = enqueue(&targets, queues, &mut imports);
+        let loaded = loaded(&instances, access, &mut imports);
+        let mut stored = String::new();
+        for (number, store) in access.stores.iter().enumerate() {
+            let _ = writeln!(stored, "{}        {store}", if number == 0 { "\n" } else { "" });
+        }
+        let counted = add_tallies(counts, &mut imports);
+        format!(
+            "{imports}\n\
+             /// {heading} of a path: {} bytes of state in, {} out.\n\
+             @compute @workgroup_size({workgroup})\n\
+             fn {kernel}_main{PARAMETERS} {{\n    \
+                 let index = (group.y * groups.x + group.x) * {workgroup}u + lane;\n\
+             {locals}    \
+                 if {condition} {{\n        \
+                     path_id = {path};\n\
+             {loaded}\n{body}{stored}    \
+                 }}\n\
+             {enqueue}{end}{counted}}}\n",
+            access.load_bytes, access.store_bytes
+        )
+    }
+
+    /// The condition on which there is a path, and its slot.
+    fn path(self, imports: &mut Imports) -> (String, String) {
+        imports.add("pass", ["path_id"]);
+        match self.source {
+            Source::Slots => {
+                imports.add("pass", ["pass_info"]);
+                ("index < pass_info.slots".to_owned(), "index".to_owned())
+            }
+            Source::Queue if self.queues.kind == QueueKind::None => {
+                let constant = stage_constant(self.entry);
+                imports.add("queue", ["takes", constant.as_str()]);
+                (format!("takes({constant}, index)"), "index".to_owned())
+            }
+            Source::Queue => {
+                let constant = stage_constant(self.entry);
+                imports.add("pass", ["path_count"]);
+                imports.add("control", ["running"]);
+                imports.add("queue", ["queue", constant.as_str()]);
+                (format!("index < running({constant})"), format!("queue[{constant} * path_count + index]"))
+            }
+        }
+    }
+}
+
+/// The instances, with what is loaded into them.
+fn loaded(instances: &IndexMap<String, String>, access: &Access, imports: &mut Imports) -> String {
+    let mut text = String::new();
+    if !instances.is_empty() {
         text.push('\n');
     }
-    for (instance, record) in &stage.instances {
+    for (instance, record) in instances {
         imports.add("state", [record.as_str()]);
         let _ = writeln!(text, "        var {instance}: {record};");
     }
@@ -100,33 +151,39 @@ fn push_instances(text: &mut String, stage: &WiredStage, access: &Access, import
         });
         imports.add("real", used.copied());
     }
+    text
 }
 
-fn call(stage: &WiredStage) -> String {
+/// The call of a stage function.
+pub(super) fn call(stage: &WiredStage) -> String {
     let arguments: Vec<String> = stage.instances.iter().map(|(instance, _)| format!("&{instance}")).collect();
-    let call = format!("{}({})", stage.entry.name, arguments.join(", "));
-    if stage.routes.is_empty() {
-        return format!("_ = {call};");
-    }
-    format!("outcome = {call};")
+    format!("{}({})", stage.entry.name, arguments.join(", "))
 }
 
-/// A line for every stage that an outcome leads to.
-fn enqueue(stage: &WiredStage, queues: &Queues, imports: &mut Imports) -> String {
-    let mut targets: IndexMap<&str, Vec<String>> = IndexMap::new();
-    for (outcome, target) in &stage.routes {
-        targets.entry(target).or_default().push(outcome.to_uppercase());
-    }
+/// Constants of the outcomes that lead somewhere.
+fn outcomes(stage: &WiredStage) -> Vec<String> {
+    stage.routes.iter().map(|(outcome, _)| outcome.to_uppercase()).collect()
+}
+
+/// Every stage that an outcome leads to, and on which outcomes.
+fn targets(stage: &WiredStage) -> Vec<(String, String)> {
+    let led = stage.outcomes_by_target().into_iter();
+    let tests = led.map(|(target, outcomes)| {
+        let tests: Vec<String> = outcomes.iter().map(|outcome| format!("outcome == {outcome}")).collect();
+        (target.to_owned(), tests.join(" || "))
+    });
+    tests.collect()
+}
+
+/// A line for every stage that waits for paths.
+fn enqueue(targets: &[(String, String)], queues: &Queues, imports: &mut Imports) -> String {
     let mut text = String::new();
     if !targets.is_empty() {
         text.push('\n');
     }
-    for (target, outcomes) in targets {
+    for (target, wanted) in targets {
         let constant = stage_constant(target);
-        imports.add("outcome", outcomes.iter().map(String::as_str));
         imports.add("queue", [constant.as_str()]);
-        let tests: Vec<String> = outcomes.iter().map(|outcome| format!("outcome == {outcome}")).collect();
-        let wanted = tests.join(" || ");
         let _ = if queues.is_ordered(target) {
             imports.add("queue", ["wait_for"]);
             writeln!(text, "    if {wanted} {{\n        wait_for({constant}, path_id);\n    }}")
@@ -178,6 +235,9 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "group",
         "groups",
         "lane",
+        "next",
+        "round",
+        "rays",
         "outcome",
         "record",
         "path_id",

@@ -1,7 +1,9 @@
 //! The generator's last step: modules and kernels as text, the plan, the report.
 
+mod chain;
 mod entry;
 mod film;
+mod fusion;
 mod housekeeping;
 mod kernel;
 mod memory;
@@ -21,7 +23,7 @@ mod wiring;
 use crate::analyze::{self, Leaf, Liveness};
 use crate::config;
 use crate::config::evaluate_rounds;
-use crate::config::model::{PathOrder, Selection, Variant};
+use crate::config::model::{PathOrder, QueueKind, Selection, Variant};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::layout::{self, Placement};
 use crate::link::Modules;
@@ -66,12 +68,12 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     };
     warnings.extend(wiring.warnings.iter().cloned());
     let start = &variant.pipeline.start.value;
-    let liveness = analyze::liveness(&wiring.flow(start));
+    let liveness = analyze::liveness(&wiring.flow());
     check_initialised(&wiring, &liveness, start)?;
     let placement = layout::assign(&variant, &liveness)?;
     let queues = queues(&wiring, &variant);
     let layers = film::used(layers, &wiring.splats);
-    add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues);
+    add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues, rounds);
     add_module(sources, &mut modules, "film", film::module(variant.schedule.accumulate, &layers));
     let program = Program {
         variant: &variant,
@@ -124,7 +126,7 @@ fn add_config_modules(
     let outcomes = modules::outcome_names(pipeline, &imported_outcomes(sources, modules, variant));
     let state = modules::state(pipeline)?;
     // Stages are analysed against counters and queues of no stage: which there are follows from the analysis.
-    let queues = Queues { workgroup: variant.schedule.workgroup.value, ..Queues::default() };
+    let queues = Queues::none(variant.schedule.workgroup.value);
     let texts = [
         ("real", modules::real(variant.precision.real)),
         ("state", state),
@@ -132,7 +134,7 @@ fn add_config_modules(
         ("features", modules::features(&variant.effects)),
         ("params", modules::params(&pipeline.params)),
         ("pass", modules::PASS.to_owned()),
-        ("control", queue::control_module(&queues)),
+        ("control", queue::control_module(&queues, 0)),
         ("film", film::module(variant.schedule.accumulate, layers)),
         ("streams", stream::analysis_module(pipeline)),
         ("stored", stored::module(pipeline, &BTreeMap::new())),
@@ -165,11 +167,12 @@ fn add_state_modules(
     wiring: &Wiring,
     placement: &Placement,
     queues: &Queues,
+    rounds: u32,
 ) {
-    let kind = variant.schedule.queue;
     let texts = [
-        ("control", queue::control_module(queues)),
-        ("queue", queue::queue_module(queues, kind)),
+        ("control", queue::control_module(queues, rounds)),
+        ("next", chain::module(wiring)),
+        ("queue", queue::queue_module(queues)),
         ("tables", memory::module(placement)),
         ("stored", stored::module(&variant.pipeline, &placement.leaves)),
         ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule))),
@@ -181,12 +184,15 @@ fn add_state_modules(
 
 fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
     let batched = wiring.streams.iter().filter(|(_, stream)| stream.batched);
-    let stages: Vec<String> = wiring.stages.keys().filter(|stage| wiring.is_looped(stage)).cloned().collect();
-    let mixed = |stage: &&String| variant.schedule.order == PathOrder::Slot && wiring.feeders(stage) > 1;
+    let stages: Vec<String> = wiring.fusion.queued.keys().cloned().collect();
+    let kind = variant.schedule.queue;
+    let sorts = variant.schedule.order == PathOrder::Slot && kind != QueueKind::None;
+    let mixed = |stage: &&String| sorts && wiring.fusion.feeders(stage) > 1;
     Queues {
         ordered: stages.iter().filter(mixed).cloned().collect(),
         stages,
         streams: batched.map(|(name, _)| name.clone()).collect(),
+        kind,
         workgroup: variant.schedule.workgroup.value,
     }
 }

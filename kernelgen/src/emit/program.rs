@@ -1,7 +1,9 @@
 //! From kernel texts to the plan: linking, validation, buffers, the order of steps.
 
+use super::chain;
+use super::fusion::Chain;
 use super::housekeeping::{self, Entries, Prepared};
-use super::kernel::{self, Source};
+use super::kernel::{self, Frame, Source};
 use super::memory::{self, Access};
 use super::queue::{self, Queues};
 use super::room;
@@ -76,21 +78,23 @@ struct Draft {
 impl Builder<'_> {
     fn steps(&mut self) -> Vec<Step> {
         let program = self.program;
-        let start = program.variant.pipeline.start.value.as_str();
-        let start_rays = program.wiring.stages.get(start).and_then(|stage| stage.rays);
+        let fusion = &program.wiring.fusion;
+        let start_rays = self.rays(&fusion.start);
         let begin = self.housekeeping("begin", housekeeping::begin_kernel(start_rays), 64);
-        let first = self.stage(start, Source::Slots);
+        let first = self.stages(&fusion.start, Source::Slots);
         let consumers = self.consumers();
         let body = self.round(&consumers);
         let left: Vec<Prepared> =
             consumers.keys().map(|stream| self.prepared_stream(stream, Entries::Stream(stream.clone()))).collect();
-        let finish = self.housekeeping("finish", housekeeping::finish_kernel(program.queues, &left), 1);
-        let mut steps = vec![
-            Step::Single { kernel: begin },
-            Step::Dispatch { kernel: first },
-            Step::Loop { rounds: program.rounds, body },
-            Step::Single { kernel: finish },
-        ];
+        let mut steps = vec![Step::Single { kernel: begin }, Step::Dispatch { kernel: first }];
+        if !body.is_empty() {
+            let rounds = if fusion.is_repeated() { program.rounds } else { 1 };
+            steps.push(Step::Loop { rounds, body });
+        }
+        if program.queues.count() > 0 {
+            let finish = self.housekeeping("finish", housekeeping::finish_kernel(program.queues, &left), 1);
+            steps.push(Step::Single { kernel: finish });
+        }
         steps.extend(consumers.into_values());
         steps
     }
@@ -123,7 +127,7 @@ impl Builder<'_> {
                 if queues.is_ordered(&stage) {
                     body.push(self.order(&stage));
                 }
-                let kernel = self.stage(&stage, Source::Queue);
+                let kernel = self.stages(&self.program.wiring.fusion.queued[&stage], Source::Queue);
                 body.push(Step::Indirect { kernel, slot: queues.of_stage(&stage).unwrap_or_default() });
             }
         }
@@ -137,12 +141,9 @@ impl Builder<'_> {
         first.is_some_and(|first| group.contains(first))
     }
 
-    /// Consecutive stages of which none feeds a later one: their queues are complete when the first of them runs.
+    /// Consecutive kernels, by entry, of which none feeds a later one: their queues are complete when the first of them runs.
     fn groups(&self) -> Vec<Vec<String>> {
-        let feeds = |from: &String, to: &String| {
-            let routes = &self.program.wiring.stages[from].routes;
-            routes.iter().any(|(_, target)| target == to)
-        };
+        let feeds = |from: &String, to: &String| self.program.wiring.fusion.queued[from].exits.contains(to);
         let mut groups: Vec<Vec<String>> = Vec::new();
         for stage in &self.program.queues.stages {
             match groups.last_mut() {
@@ -156,9 +157,15 @@ impl Builder<'_> {
     }
 
     fn prepared_stage(&self, stage: &str) -> Prepared {
-        let rays = self.program.wiring.stages[stage].rays;
+        let rays = self.rays(&self.program.wiring.fusion.queued[stage]);
         let ordered = self.program.queues.is_ordered(stage);
         Prepared { entries: Entries::Stage { stage: stage.to_owned(), ordered }, rays }
+    }
+
+    /// What all rays of a kernel are counted as, whoever counts by how many paths it takes; several stages count by themselves.
+    fn rays(&self, chain: &Chain) -> Option<RayKind> {
+        let stage = self.program.wiring.stages.get(&chain.entry)?;
+        if chain.is_fused() { None } else { stage.rays }
     }
 
     fn prepared_stream(&self, name: &str, entries: Entries) -> Prepared {
@@ -169,7 +176,7 @@ impl Builder<'_> {
     fn prepared_full(&self, name: &str, group: &[String]) -> Prepared {
         let Program { wiring, queues, .. } = self.program;
         let done = queues.stages.iter().position(|stage| *stage == group[0]).unwrap_or_default();
-        let ahead = room::ahead(wiring, &queues.stages[done..], &wiring.streams[name].pushes);
+        let ahead = room::ahead_in_round(&wiring.fusion, done, &wiring.streams[name].pushes);
         self.prepared_stream(name, Entries::FullStream { stream: name.to_owned(), ahead })
     }
 
@@ -192,23 +199,30 @@ impl Builder<'_> {
         self.compile(Draft { name: name.to_owned(), text, workgroup, ..Draft::default() })
     }
 
-    fn stage(&mut self, name: &str, source: Source) -> usize {
-        let program = self.program;
-        let stage = &program.wiring.stages[name];
-        let access = match program.liveness.kernels.get(name) {
-            Some(traffic) => memory::access(program.placement, traffic),
+    /// The kernel of a stage, or of several.
+    fn stages(&mut self, chain: &Chain, source: Source) -> usize {
+        let Program { wiring, queues, liveness, .. } = *self.program;
+        let entry = chain.entry.as_str();
+        let access = match liveness.kernels.get(entry) {
+            Some(traffic) => memory::access(self.program.placement, traffic),
             None => Access::default(),
         };
-        let starts_again = source == Source::Slots && program.wiring.is_looped(name);
-        let kernel = if starts_again { format!("{name}_first") } else { name.to_owned() };
+        let starts_again = source == Source::Slots && wiring.fusion.queued.contains_key(entry);
+        let kernel = if starts_again { format!("{entry}_first") } else { entry.to_owned() };
+        let frame = Frame { kernel: &kernel, entry, source, queues, access: &access };
+        let text = match wiring.stages.get(entry) {
+            Some(stage) if !chain.is_fused() => kernel::stage_kernel(frame, stage),
+            _ => chain::chain_kernel(frame, wiring, chain),
+        };
+        let others = chain.stages.iter().filter(|name| *name != entry);
         self.compile(Draft {
-            text: kernel::stage_kernel(&kernel, name, stage, source, program.queues, &access),
+            text,
             name: kernel,
-            workgroup: program.queues.workgroup,
-            stages: vec![name.to_owned()],
+            workgroup: queues.workgroup,
+            stages: std::iter::once(entry).chain(others.map(String::as_str)).map(str::to_owned).collect(),
             load_bytes: access.load_bytes,
             store_bytes: access.store_bytes,
-            rays: stage.rays,
+            rays: self.rays(chain),
         })
     }
 

@@ -13,20 +13,28 @@ pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
     WORDS.iter().copied().zip(0..).take(WORDS.len() - 1)
 }
 
-/// Every queue of the program: one a stage of the loop, one a batched stream.
-#[derive(Clone, Debug, Default)]
+/// Every queue of the program: one a kernel of the loop, one a batched stream.
+#[derive(Clone, Debug)]
 pub(super) struct Queues {
-    /// Stages, in the order in which a round runs them.
+    /// Stages that kernels of the loop begin with, in the order in which a round runs them.
     pub stages: Vec<String>,
     /// Those of them that take their paths in the order of slots.
     pub ordered: Vec<String>,
     /// Batched streams.
     pub streams: Vec<String>,
+    /// How a path finds its place; with `None`, paths are marked instead.
+    pub kind: QueueKind,
     /// Threads in a workgroup of the kernels that take from them.
     pub workgroup: u32,
 }
 
 impl Queues {
+    /// No queue.
+    pub(super) fn none(workgroup: u32) -> Queues {
+        let (stages, ordered, streams) = (Vec::new(), Vec::new(), Vec::new());
+        Queues { stages, ordered, streams, kind: QueueKind::None, workgroup }
+    }
+
     /// Queues in all.
     pub(super) fn count(&self) -> u32 {
         (self.stages.len() + self.streams.len()) as u32
@@ -55,7 +63,7 @@ impl Queues {
 }
 
 /// `package::control`: counters that kernels and host share.
-pub(super) fn control_module(queues: &Queues) -> String {
+pub(super) fn control_module(queues: &Queues, rounds: u32) -> String {
     let mut text = String::new();
     for (name, word) in WORDS.iter().zip(0..) {
         let _ = writeln!(text, "const CONTROL_{}: u32 = {word}u;", name.to_uppercase());
@@ -64,6 +72,8 @@ pub(super) fn control_module(queues: &Queues) -> String {
         text,
         "/// Words in all.\n\
          const CONTROL_WORDS: u32 = {}u;\n\n\
+         /// Rounds after which no path may be alive.\n\
+         const ROUNDS: u32 = {rounds}u;\n\n\
          /// Counters of a pass, then two words a queue: how many wait in it, how many its running kernel takes.\n\
          var<storage, read_write> control: array<atomic<u32>>;\n\n\
          /// The word that counts what waits in a queue.\n\
@@ -78,6 +88,7 @@ pub(super) fn control_module(queues: &Queues) -> String {
     );
     text.push_str(COUNT_WALK_RAYS);
     text.push_str(COUNT_RAY);
+    text.push_str(FUSED);
     text
 }
 
@@ -99,8 +110,46 @@ fn count_ray(word: u32) {
 }
 ";
 
+/// What kernels of several stages count by themselves: nobody else knows what happens in them.
+const FUSED: &str = r"
+/// How many rounds have begun.
+fn rounds_begun() -> u32 {
+    return atomicLoad(&control[CONTROL_ROUND]);
+}
+
+/// A walk ray of a round: primary, secondary, deep and visibility rays.
+fn walk_ray(round: u32) -> vec4u {
+    return vec4u(vec3<u32>(vec3<bool>(round <= 1u, round == 2u, round > 2u)), 0u);
+}
+
+/// Rays of this workgroup.
+var<workgroup> rays_share: array<atomic<u32>, 4>;
+
+/// Adds rays, with one atomic a workgroup; `lane` numbers its invocations, which must all call it.
+fn add_rays(rays: vec4u, lane: u32) {
+    for (var kind = 0u; kind < 4u; kind += 1u) {
+        if rays[kind] > 0u {
+            atomicAdd(&rays_share[kind], rays[kind]);
+        }
+    }
+    workgroupBarrier();
+    if lane < 4u {
+        let counted = atomicLoad(&rays_share[lane]);
+        if counted > 0u {
+            atomicAdd(&control[CONTROL_RAYS_PRIMARY + lane], counted);
+        }
+    }
+}
+
+/// Counts a path that is given up.
+fn count_unfinished() {
+    atomicAdd(&control[CONTROL_UNFINISHED], 1u);
+}
+";
+
 /// `package::queue`: how paths wait for stages.
-pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
+pub(super) fn queue_module(queues: &Queues) -> String {
+    let kind = queues.kind;
     let mut text = String::from(
         "import package::control::{control, waiting, waiting_word};\n\
          import package::pass::{path_count, pass_info};\n\n",
@@ -124,14 +173,21 @@ pub(super) fn queue_module(queues: &Queues, kind: QueueKind) -> String {
         QueueKind::Atomic => ENQUEUE_ATOMIC,
         QueueKind::Subgroup => ENQUEUE_SUBGROUP,
         QueueKind::Workgroup => ENQUEUE_WORKGROUP,
+        QueueKind::None => MARK,
     });
     if !queues.ordered.is_empty() {
         text.push_str(ORDER);
     }
     text.push_str(APPEND);
+    let threads = match kind {
+        QueueKind::None => {
+            format!("select(entries, pass_info.slots, entries > 0u && number < {}u)", queues.stages.len())
+        }
+        _ => "entries".to_owned(),
+    };
     let _ = write!(
         text,
-        "{START_QUEUE}    let groups = (entries + {}u) / {}u;{SIZE_DISPATCH_END}",
+        "{START_QUEUE}    let groups = ({threads} + {}u) / {}u;{SIZE_DISPATCH_END}",
         queues.workgroup - 1,
         queues.workgroup
     );
@@ -217,6 +273,42 @@ const ENQUEUE_WORKGROUP: &str = r"
 /// To be called by all invocations of a workgroup.
 fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
     place_side_by_side(number, waiting_word(number), wanted, path, lane);
+}
+";
+
+/// Dispatches of stages have an invocation for every slot then, or none where no path waits.
+const MARK: &str = r"
+/// The stage that a path waits for, its number plus one; 0: none.
+var<storage, read_write> waits_for: array<u32>;
+
+/// Paths of this workgroup that a stage gets.
+var<workgroup> arrivals: atomic<u32>;
+
+/// Lets this path wait for a stage where `wanted`, and counts how many do, with one atomic a workgroup; `lane` numbers its
+/// invocations, which must all call it.
+fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
+    if lane == 0u {
+        atomicStore(&arrivals, 0u);
+    }
+    workgroupBarrier();
+    if wanted {
+        waits_for[path] = number + 1u;
+        atomicAdd(&arrivals, 1u);
+    }
+    workgroupBarrier();
+    if lane == 0u && atomicLoad(&arrivals) > 0u {
+        atomicAdd(&control[waiting_word(number)], atomicLoad(&arrivals));
+    }
+    workgroupBarrier();
+}
+
+/// Whether the path of a slot waits for a stage, which takes it then.
+fn takes(number: u32, path: u32) -> bool {
+    if path >= pass_info.slots || waits_for[path] != number + 1u {
+        return false;
+    }
+    waits_for[path] = 0u;
+    return true;
 }
 ";
 

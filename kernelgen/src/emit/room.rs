@@ -5,6 +5,7 @@
 //! paths that wait can still push in this round. Only if so many might find no room behind what is already there is the stream
 //! emptied first. A pass uses so few slots that an emptied stream takes whatever one round pushes, so none ever overflows.
 
+use super::fusion::Fusion;
 use super::wiring::Wiring;
 use crate::config::model::Schedule;
 use crate::plan::SLOT_GRAIN;
@@ -24,28 +25,36 @@ pub(super) fn text(records: u32) -> String {
     }
 }
 
-/// Most records that a path which waits for one of these stages can still push in the round, by stage; 0 is left out. `stages` are
-/// those that the round has yet to run, in this order.
-pub(super) fn ahead(wiring: &Wiring, stages: &[String], pushes: &IndexMap<String, u32>) -> IndexMap<String, u32> {
+/// Most records that a path which is about to run one of these stages or kernels can still push, by name; 0 is left out. They run in
+/// this order; `leads` says whether one leads to another.
+pub(super) fn ahead<'a>(
+    order: impl DoubleEndedIterator<Item = &'a String>,
+    leads: impl Fn(&str, &str) -> bool,
+    pushes: &IndexMap<String, u32>,
+) -> IndexMap<String, u32> {
     let mut ahead: IndexMap<String, u32> = IndexMap::new();
-    for stage in stages.iter().rev() {
-        // A route back leads into the next round: its target is not among those that follow.
-        let routes = wiring.stages[stage].routes.iter();
-        let later = routes.filter_map(|(_, target)| ahead.get(target)).max().copied().unwrap_or(0);
-        let most = pushes.get(stage).copied().unwrap_or(0) + later;
+    for name in order.rev() {
+        // A way back leads into the next round: its target is not among those that follow.
+        let later = ahead.iter().filter(|(target, _)| leads(name, target)).map(|(_, most)| *most).max().unwrap_or(0);
+        let most = pushes.get(name).copied().unwrap_or(0) + later;
         if most > 0 {
-            ahead.insert(stage.clone(), most);
+            ahead.insert(name.clone(), most);
         }
     }
     ahead.reverse();
     ahead
 }
 
-/// Most records that a path pushes between two moments at which the stream may be emptied: in a round, or in the start stage.
-pub(super) fn most(wiring: &Wiring, start: &str, pushes: &IndexMap<String, u32>) -> u32 {
-    let looped: Vec<String> = wiring.stages.keys().filter(|stage| wiring.is_looped(stage)).cloned().collect();
-    let in_a_round = ahead(wiring, &looped, pushes).into_values();
-    in_a_round.chain(pushes.get(start).copied()).max().unwrap_or(0)
+/// `ahead` for paths that wait for kernels which a round has yet to run: those behind the first `done`.
+pub(super) fn ahead_in_round(fusion: &Fusion, done: usize, pushes: &IndexMap<String, u32>) -> IndexMap<String, u32> {
+    let leads = |from: &str, to: &str| fusion.queued.get(from).is_some_and(|chain| chain.exits.contains(to));
+    ahead(fusion.queued.keys().skip(done), leads, pushes)
+}
+
+/// Most records that a path pushes between two moments at which the stream may be emptied: in a round, or in the first kernel.
+pub(super) fn most(fusion: &Fusion, pushes: &IndexMap<String, u32>) -> u32 {
+    let in_a_round = ahead_in_round(fusion, 0, pushes).into_values();
+    in_a_round.chain(pushes.get(&fusion.start.entry).copied()).max().unwrap_or(0)
 }
 
 /// Slots that a pass may use of every `SLOT_GRAIN`.

@@ -322,12 +322,169 @@ fn paths_that_come_from_several_stages_are_put_in_order() {
     assert!(kernel(&plan, "prepare_trace").module.contains("open_order(QUEUE_TRACE);"));
 }
 
+/// Every slot is looked at, and only where a path waits for the kernel at all.
+#[test]
+fn without_queues_paths_are_marked() {
+    let plan = generated(&[("schedule.queue", "none"), ("schedule.order", "slot")]).plan;
+    let trace = &kernel(&plan, "trace").module;
+    assert!(trace.contains("if takes(QUEUE_TRACE, index) {\n        path_id = index;"), "{trace}");
+    assert!(trace.contains("waits_for[path] = number + 1u;") && !trace.contains("subgroup"), "{trace}");
+    let prepare = &kernel(&plan, "prepare_trace").module;
+    assert!(prepare.contains("select(entries, pass_info.slots, entries > 0u && number < 2u)"), "{prepare}");
+    let queues: Vec<&str> =
+        plan.buffers.iter().filter(|buffer| buffer.role == Role::Queue).map(|buffer| buffer.name.as_str()).collect();
+    assert_eq!(queues, ["waits_for"]);
+    assert!(plan.kernels.iter().all(|kernel| !kernel.name.starts_with("order_")));
+}
+
 #[test]
 fn paths_that_come_from_one_stage_are_not_put_in_order() {
     for plan in [generated(&[("schedule.order", "slot")]).plan, with_two_feeders("arrival")] {
         assert!(plan.kernels.iter().all(|kernel| !kernel.module.contains("waits_for")));
         assert!(plan.buffers.iter().all(|buffer| buffer.name != "waits_for"));
     }
+}
+
+/// The schedule that fuses these groups, with inline visibility.
+fn fused(fuse: &str) -> Generated {
+    generated(&[("schedule.fuse", fuse), ("schedule.batch", "[]")])
+}
+
+#[test]
+fn a_megakernel_stores_nothing_and_waits_for_nothing() {
+    let parts = fused("all");
+    let plan = &parts.plan;
+    assert_eq!(names(plan, &plan.program), ["begin", "emit"]);
+    assert_eq!((plan.bytes_per_path, plan.kernels[1].rays), (0, None));
+    assert_eq!(plan.kernels[1].stages, ["emit", "trace", "shade"]);
+    assert!(plan.buffers.iter().all(|buffer| !matches!(buffer.role, Role::State | Role::Queue | Role::Arguments)));
+    assert!(!kernel(plan, "begin").module.contains("CONTROL_RAYS"), "the kernel counts its rays itself");
+    let explained = parts.report.field("eye.throughput").unwrap();
+    assert!(explained.contains("not stored: lives within one kernel"), "{explained}");
+    assert!(parts.report.field("eye.scratch").unwrap().contains("dead: written by `emit`"));
+    let expected = "    var next = NEXT_END;
+    var rays = vec4u();
+    if index < pass_info.slots {
+        path_id = index;
+
+        var path: Path;
+        var eye: Walk;
+
+        switch emit(&path, &eye) {
+            case EMITTED: { next = NEXT_TRACE; }
+            default: { next = NEXT_END; }
+        }
+        for (var round = 1u; next != NEXT_END; round += 1u) {
+            if round > ROUNDS {
+                count_unfinished();
+                next = NEXT_END;
+                break;
+            }
+            if next == NEXT_TRACE {
+                rays += walk_ray(round);
+                switch trace_walk(&eye) {
+                    case HIT: { next = NEXT_SHADE; }
+                    default: { next = NEXT_END; }
+                }
+            }
+            if next == NEXT_SHADE {
+                switch shade(&path, &eye) {
+                    case SCATTERED: { next = NEXT_TRACE; }
+                    default: { next = NEXT_END; }
+                }
+            }
+        }
+    }
+
+    add_rays(rays, lane);
+}";
+    let module = &plan.kernels[1].module;
+    assert!(module.contains(expected), "{module}");
+    assert!(module.contains("const ROUNDS: u32 = 5u;"), "{module}");
+}
+
+#[test]
+fn a_group_without_a_way_back_is_a_straight_kernel() {
+    let pipeline = PIPELINE.replace("on.scattered = \"trace\"", "on.scattered = \"last\"")
+        + "last = { entry = \"trace_walk\", with.walk = \"eye\", on.hit = \"end\", on.miss = \"end\" }\n";
+    let set = [("schedule.fuse", r#"[["trace", "shade"]]"#)];
+    let result = crate::generate(&sources(&pipeline, LAYOUT, STAGES), &selection(&set));
+    let plan = result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan;
+    let Some(Step::Loop { rounds: 1, body }) = plan.program.get(2) else { panic!("{:?}", plan.program) };
+    let expected = ["prepare_trace", "resolve_connection", "trace", "prepare_last", "last"];
+    assert_eq!(names(&plan, body), expected, "paths that wait for the kernel may push once each");
+    let module = &kernel(&plan, "trace").module;
+    let expected = "
+        rays += walk_ray(rounds_begun());
+        switch trace_walk(&eye) {
+            case HIT: { next = NEXT_SHADE; }
+            default: { next = NEXT_END; }
+        }
+        if next == NEXT_SHADE {
+            switch shade(&path, &eye) {
+                case SCATTERED: { next = NEXT_LAST; }
+                default: { next = NEXT_END; }
+            }
+        }
+";
+    assert!(module.contains(expected), "{module}");
+    assert!(module.contains("    enqueue(QUEUE_LAST, next == NEXT_LAST, path_id, lane);\n\n    add_rays("), "{module}");
+    assert!(kernel(&plan, "prepare_trace").module.contains("connection_room(), waiting(QUEUE_TRACE))"));
+}
+
+/// Each stage that others lead to from outside has a queue and a kernel of its own, which knows where its paths begin.
+#[test]
+fn a_group_with_two_entries_has_two_kernels() {
+    let pipeline = PIPELINE.replace("on.hit = \"shade\", on.miss = \"end\"", "on.hit = \"shade\", on.miss = \"relay\"")
+        + "relay = { entry = \"trace_walk\", with.walk = \"eye\", on.hit = \"shade\", on.miss = \"end\" }\n";
+    let set = [("schedule.fuse", r#"[["trace", "shade"]]"#), ("schedule.batch", "[]")];
+    let result = crate::generate(&sources(&pipeline, LAYOUT, STAGES), &selection(&set));
+    let parts = result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false)));
+    let plan = parts.plan;
+    assert_eq!(kernel(&plan, "trace").stages, ["trace", "shade"]);
+    assert_eq!(kernel(&plan, "shade").stages, ["shade", "trace"]);
+    assert_eq!(kernel(&plan, "relay").stages, ["relay"]);
+    for (name, begun) in [("trace", "NEXT_TRACE"), ("shade", "NEXT_SHADE")] {
+        let module = &kernel(&plan, name).module;
+        let head = format!(
+            "next = {begun};\n        for (var round = rounds_begun(); next != NEXT_END && next != NEXT_RELAY;"
+        );
+        assert!(module.contains(&head), "{module}");
+        assert!(module.contains("enqueue(QUEUE_RELAY, next == NEXT_RELAY"), "{module}");
+    }
+    let loads_hit = |name: &str| {
+        let kernel = parts.report.kernels.iter().find(|kernel| kernel.name == name).unwrap();
+        kernel.loads.contains(&"eye.hit.t".to_owned())
+    };
+    assert!(loads_hit("shade") && !loads_hit("trace"), "who begins with `trace` finds the hit by itself");
+    let Some(Step::Loop { rounds: 5, body }) = plan.program.get(2) else { panic!("{:?}", plan.program) };
+    assert_eq!(names(&plan, body), ["prepare_trace", "trace", "shade", "prepare_relay", "relay"]);
+}
+
+#[test]
+fn walks_are_traced_and_scattered_in_one_kernel() {
+    let parts = fused("walks");
+    assert_eq!(kernel(&parts.plan, "trace").stages, ["trace", "shade"]);
+    assert_eq!(kernel(&parts.plan, "emit").stages, ["emit"]);
+    let stored: Vec<&str> =
+        parts.report.tables.iter().flat_map(|table| &table.fields).map(|field| field.name.as_str()).collect();
+    assert!(!stored.contains(&"eye.hit.t") && stored.contains(&"eye.position"), "{stored:?}");
+}
+
+#[test]
+fn what_cannot_be_fused_is_refused() {
+    let code = |fuse: &str| {
+        let result = crate::generate(&sources(PIPELINE, LAYOUT, STAGES), &selection(&[("schedule.fuse", fuse)]));
+        let refusal = result.expect_err(fuse);
+        let text = refusal.render(false);
+        assert!(refusal.diagnostics.iter().all(|finding| !finding.help.is_empty()), "{text}");
+        refusal.diagnostics[0].code
+    };
+    assert_eq!(code("everything"), "K0107");
+    assert_eq!(code(r#"["trace", "shade"]"#), "K0106");
+    assert_eq!(code(r#"[["trace", "shda"]]"#), "K0202");
+    assert_eq!(code(r#"[["trace", "shade"], ["shade", "emit"]]"#), "K0225");
+    assert_eq!(code("all"), "K0226", "the stream is batched");
 }
 
 #[test]

@@ -47,3 +47,8 @@ pub(super) fn stage_constant(stage: &str) -> String {
 pub(super) fn stream_constant(stream: &str) -> String {
     format!("STREAM_{}", stream.to_uppercase())
 }
+
+/// The WGSL constant of a stage that a path goes on with inside a kernel.
+pub(super) fn next_constant(stage: &str) -> String {
+    format!("NEXT_{}", stage.to_uppercase())
+}

@@ -1,6 +1,7 @@
 //! Stages and stream consumers as they are wired: found, linked, analysed, and checked against what the pipeline says.
 
 use super::entry::{Entries, Entry};
+use super::fusion::{Chain, Fusion};
 use super::room;
 use super::signature::{Signature, signature};
 use crate::analyze::{self, Flow, FlowStage, Leaf, StageFacts};
@@ -29,6 +30,8 @@ pub(super) struct Texts<'a> {
 pub(super) struct Wiring {
     /// Stages, in the order of the pipeline.
     pub stages: IndexMap<String, WiredStage>,
+    /// Which of them share a kernel.
+    pub fusion: Fusion,
     /// Streams that one of them pushes to, in the order of the pipeline.
     pub streams: IndexMap<String, WiredStream>,
     /// Outcomes that never come, stages that nothing reaches.
@@ -60,7 +63,7 @@ pub(super) struct WiredStream {
     pub batched: bool,
     /// Leaves of the record that the consumer reads, in the order of the record.
     pub leaves: Vec<StateLeaf>,
-    /// Most records that one run of a stage pushes, by stage; of a batched stream only.
+    /// Most records that one run of a kernel pushes, by its entry; of a batched stream only.
     pub pushes: IndexMap<String, u32>,
     /// Most records of a path between two moments at which a batched stream may be emptied.
     pub most: u32,
@@ -70,26 +73,37 @@ pub(super) struct WiredStream {
 }
 
 impl Wiring {
-    /// Whether the loop runs this stage: every stage but one that only starts paths.
-    pub(super) fn is_looped(&self, stage: &str) -> bool {
-        self.stages.values().any(|other| other.routes.iter().any(|(_, target)| target == stage))
-    }
-
-    /// How many stages of the loop lead to this one.
-    pub(super) fn feeders(&self, stage: &str) -> usize {
-        let leads = |other: &WiredStage| other.routes.iter().any(|(_, target)| target == stage);
-        self.stages.iter().filter(|(name, other)| self.is_looped(name) && leads(other)).count()
-    }
-
     /// The graph for liveness.
-    pub(super) fn flow(&self, start: &str) -> Flow {
+    pub(super) fn flow(&self) -> Flow {
         let stage = |(name, stage): (&String, &WiredStage)| {
-            let next: IndexSet<String> = stage.routes.iter().map(|(_, target)| target.clone()).collect();
+            let next = stage.outcomes_by_target().into_iter().map(|(target, outcomes)| {
+                (target.to_owned(), stage.facts.written_with(outcomes.iter().map(|outcome| outcome.to_lowercase())))
+            });
             let traces = stage.rays == Some(RayKind::Walk);
-            let flow = FlowStage { facts: stage.facts.clone(), next: next.into_iter().collect(), traces };
-            (name.clone(), flow)
+            (name.clone(), FlowStage { facts: stage.facts.clone(), next: next.collect(), traces })
         };
-        Flow { stages: self.stages.iter().map(stage).collect(), start: start.to_owned() }
+        Flow { stages: self.stages.iter().map(stage).collect(), kernels: self.fusion.kernels(self.stages.keys()) }
+    }
+}
+
+impl WiredStage {
+    /// The stages that its outcomes lead to; one may come several times.
+    pub(super) fn targets(&self) -> impl Iterator<Item = &str> {
+        self.routes.iter().map(|(_, target)| target.as_str())
+    }
+
+    /// Whether an outcome leads there.
+    pub(super) fn leads_to(&self, stage: &str) -> bool {
+        self.targets().any(|target| target == stage)
+    }
+
+    /// The constants of the outcomes that lead to each stage.
+    pub(super) fn outcomes_by_target(&self) -> IndexMap<&str, Vec<String>> {
+        let mut targets: IndexMap<&str, Vec<String>> = IndexMap::new();
+        for (outcome, target) in &self.routes {
+            targets.entry(target).or_default().push(outcome.to_uppercase());
+        }
+        targets
     }
 }
 
@@ -100,7 +114,7 @@ impl Wiring {
 /// K0209 a stage that routes to itself, K0211 a consumer that asks for its path, K0212 a consumer that pushes, K0215 a function that
 /// is no stage, K0217 pushes to a batched stream in a loop, K0219 two parameters for one instance, K0220 an instance for a parameter
 /// that is not there, K0221 a consumer that takes something else than one record, K0222 a batched
-/// stream without room for a round; K03xx of the stage texts.
+/// stream without room for a round, K0226 pushes to a batched stream in a loop of fused stages; K03xx of the stage texts.
 /// Warnings: K0204 an outcome that never comes, K0205 a stage that nothing reaches.
 pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Diagnostic>> {
     let mut wirer = Wirer {
@@ -113,6 +127,8 @@ pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Di
     };
     let reached = wirer.reach();
     wirer.keep_reached(&reached);
+    let start = &variant.pipeline.start.value;
+    wirer.wiring.fusion = Fusion::new(&wirer.wiring.stages, start, &variant.schedule.fuse.value);
     wirer.wire_streams();
     if wirer.findings.is_empty() { Ok(wirer.wiring) } else { Err(distinct(wirer.findings)) }
 }
@@ -346,7 +362,7 @@ impl Wirer<'_> {
             self.analyse(entry, |entry, signature| check_consumer_signature(name, stream, entry, signature), &bind)?;
         check_consumer(name, stream, &analysed)?;
         let pushes = if batched { self.pushes(name)? } else { IndexMap::new() };
-        let most = room::most(&self.wiring, &variant.pipeline.start.value, &pushes);
+        let most = room::most(&self.wiring.fusion, &pushes);
         check_room(variant, name, stream, most)?;
         Ok(WiredStream {
             leaves: read_leaves(variant, name, stream, &analysed.facts),
@@ -359,8 +375,36 @@ impl Wirer<'_> {
         })
     }
 
-    /// Most records that one run of each stage pushes to a stream.
+    /// Most records that one run of each kernel pushes to a stream.
     fn pushes(&self, stream: &str) -> Result<IndexMap<String, u32>, Vec<Diagnostic>> {
+        let own = self.stage_pushes(stream)?;
+        let fusion = &self.wiring.fusion;
+        let mut most = IndexMap::new();
+        for chain in std::iter::once(&fusion.start).chain(fusion.queued.values()) {
+            let mut pushing = chain.stages.iter().filter(|name| own.contains_key(*name));
+            let Some(first) = pushing.next() else { continue };
+            if chain.loops {
+                return Err(vec![self.uncountable(stream, chain, first)]);
+            }
+            let leads = |from: &str, to: &str| self.wiring.stages[from].leads_to(to);
+            most.extend(room::ahead(chain.stages.iter(), leads, &own).swap_remove_entry(&chain.entry));
+        }
+        Ok(most)
+    }
+
+    /// K0226: nothing bounds the records that a looping kernel pushes.
+    fn uncountable(&self, stream: &str, chain: &Chain, stage: &str) -> Diagnostic {
+        let schedule = &self.variant.schedule;
+        let place = schedule.batch.iter().find(|batch| batch.value == stream).map_or(schedule.fuse.span, |it| it.span);
+        let message = format!("kernel `{}` pushes to the batched stream `{stream}` in a loop", chain.entry);
+        Diagnostic::error("K0226", message)
+            .at(schedule.fuse.span, format!("stage `{stage}` pushes, and its kernel leads back to earlier stages"))
+            .also(place, "how often cannot be told, so neither how much room the stream needs")
+            .help(format!("take `{stream}` out of `schedule.batch`, or fuse only stages that lead to later ones"))
+    }
+
+    /// Most records that one run of each stage pushes to a stream.
+    fn stage_pushes(&self, stream: &str) -> Result<IndexMap<String, u32>, Vec<Diagnostic>> {
         let mut findings = Vec::new();
         let mut most = IndexMap::new();
         for (name, stage) in &self.wiring.stages {
