@@ -111,6 +111,30 @@ fn degenerate_triangles_are_harmless() {
     }
 }
 
+/// A plate of 16 km is thinner than f32 resolves at the length of the rays that hit it: they meet the side that faces them, and light
+/// that leaves there gets away. Below a sky of radiance 1 it has the radiance of its albedo, from wherever it is seen.
+#[test]
+fn plates_thinner_than_rounding_are_lit() {
+    for height in [0.7, 2.0, 13.0] {
+        let mut scene = SceneBuilder::new();
+        let plate = scene.material(Material::lambert("plate", [0.5; 3]).two_sided());
+        scene.floor(plate, 0.0, 16e3);
+        scene.ceiling(plate, -1.6e-7, 16e3);
+        let camera = Camera { eye: DVec3::Y * height, target: dvec3(0.3, 0.0, 0.2), yfov: 60.0, aspect: 1.0 };
+        scene.camera("main", camera);
+        let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
+        let job = scene.job().pipeline("pt").edges(2).size(64, 64).samples(16);
+        assert_eq!(unlit(&job.render()), 0, "pixels that lack light from a height of {height}");
+        let undecided = job.edited("trace/triangle", "(side + DISTANCE_TOLERANCE)", "side");
+        assert!(unlit(&undecided.render()) > 100, "from {height} rounding would have chosen the right side");
+    }
+}
+
+/// Pixels darker than 0.49.
+fn unlit(rendering: &Rendering) -> usize {
+    rendering.pixels.rgb.iter().filter(|pixel| pixel[0] < 0.49).count()
+}
+
 /// A light of a micrometre, and one of a kilometre a hundred kilometres away, seen at a grazing angle: L = rho/pi Le edge^2/height^2.
 #[test]
 fn tiny_and_distant_lights() {

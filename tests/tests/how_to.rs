@@ -118,3 +118,24 @@ fn the_added_bsdf_is_reciprocal() {
     let spread = spread(&z_scores(&render("pt"), &render("lt"), 1e-3));
     assert!(spread.agrees(), "{spread:?}");
 }
+
+#[test]
+fn a_field_and_a_stage_are_added() {
+    let library = library_after("how-to-add-a-stage.md");
+    let job = |pipeline: &str| {
+        let job = Job::of_file(shipped("cornell_box")).library(library.clone()).pipeline(pipeline);
+        job.size(32, 32).samples(4).fixed_point()
+    };
+    let open = job("pt").render();
+    let gated = |gate: f64, layout: &str| job("gated").set("gate", gate).layout(layout).render();
+    assert!(gated(1e6, "aos").sums == open.sums, "an open gate changes nothing");
+    let half = gated(4.5, "aos");
+    assert!(half.sums.iter().zip(&open.sums).all(|(half, open)| half <= open), "light that came through comes through");
+    assert!(half.sums != open.sums && half.sums.iter().any(|&sum| sum != 0));
+    assert!(gated(4.5, "compact").sums == half.sums, "the layout changes nothing");
+    let fields = |pipeline: &str| {
+        let tables = job(pipeline).layout("soa").report().tables;
+        tables.iter().flat_map(|table| &table.fields).filter(|field| field.name == "eye.travelled").count()
+    };
+    assert_eq!((fields("gated"), fields("pt")), (1, 0));
+}
