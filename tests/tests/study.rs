@@ -284,7 +284,7 @@ fn generate(name: &str, effects: &Effects) -> Result<(), String> {
     for scene in &study.scenes {
         study.against(scene).map_err(|error| error.to_string())?;
         for variant in &study.variants {
-            let wanted = study.wanted(variant, scene, 0).map_err(|error| error.to_string())?;
+            let wanted = study.wanted(variant, scene).map_err(|error| error.to_string())?;
             let mut library = Library::default();
             let selection =
                 wanted.settings.selection(&mut library, effects.clone()).map_err(|error| error.to_string())?;

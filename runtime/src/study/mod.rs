@@ -1,7 +1,9 @@
 //! Studies: every variant on every scene, what each costs and how far off it is, as numbers and as one page.
 
+pub mod axes;
 pub mod chart;
 pub mod file;
+pub mod interval;
 pub mod report;
 pub mod results;
 pub mod run;

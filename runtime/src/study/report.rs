@@ -2,6 +2,7 @@
 
 use super::chart::{Chart, Scale, escape, shown};
 use super::file::{Study, Wanted};
+use super::interval::Interval;
 use super::results::{Errors, Reference, Results, Run, difference_path};
 use crate::compare::Image;
 use crate::error::Error;
@@ -283,17 +284,16 @@ fn repeated(measure: &Measure, results: &Results, scene: &str, variant: &str) ->
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    Interval::of(values).map(|interval| interval.mean)
 }
 
-/// The mean of the repetitions, with their standard deviation where there are several.
+/// The mean of the repetitions, with half its 95 % confidence interval where there are several.
 fn cell(values: &[f64]) -> String {
-    let Some(mean) = mean(values) else { return String::new() };
-    if values.len() < 2 {
-        return shown(mean);
+    match Interval::of(values) {
+        Some(Interval { mean, half_width: Some(half_width) }) => format!("{} ± {}", shown(mean), shown(half_width)),
+        Some(Interval { mean, half_width: None }) => shown(mean),
+        None => String::new(),
     }
-    let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    format!("{} ± {}", shown(mean), shown((square / (values.len() - 1) as f64).sqrt()))
 }
 
 /// Where the device's time goes, kernel by kernel.
@@ -434,6 +434,6 @@ mod tests {
 
     #[test]
     fn repetitions_show_their_spread() {
-        assert_eq!([cell(&[]), cell(&[2.0]), cell(&[1.0, 3.0])], ["", "2", "2 ± 1.414"]);
+        assert_eq!([cell(&[]), cell(&[2.0]), cell(&[1.0, 3.0])], ["", "2", "2 ± 12.71"]);
     }
 }

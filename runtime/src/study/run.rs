@@ -124,6 +124,9 @@ impl<'a> Runner<'a> {
                 return Ok(());
             }
             if self.tasks[task].done.is_none() {
+                if !self.is_wanted(task) {
+                    continue;
+                }
                 self.run_task(task)?;
             }
             if let Some(reference) = &reference {
@@ -132,6 +135,14 @@ impl<'a> Runner<'a> {
             self.results().write(self.folder)?;
         }
         Ok(())
+    }
+
+    /// Whether the repetitions before this one leave the time of its variant too uncertain.
+    fn is_wanted(&self, task: usize) -> bool {
+        let Task { scene, variant, .. } = &self.tasks[task];
+        let of_both = |run: &&Run| run.scene == scene.name && run.variant == variant.name;
+        let runs = self.tasks.iter().filter_map(|task| task.done.as_ref()).filter(of_both);
+        self.study.repeat.wants_more(&runs.map(|run| run.measured.ms_per_frame()).collect::<Vec<_>>())
     }
 
     /// Generates all that will be rendered: better refused now than after the first pictures.
@@ -343,11 +354,12 @@ fn tasks_of<'a>(
     folder: &Path,
     earlier: &Results,
 ) -> Result<Vec<Task<'a>>, Error> {
+    let wanted = |variant| study.wanted(variant, scene).map_err(|error| error.at(format!("scene `{}`", scene.name)));
+    let wanted = study.variants.iter().map(wanted).collect::<Result<Vec<_>, Error>>()?;
     let mut tasks = Vec::new();
-    for repeat in 0..study.repeat {
-        for variant in &study.variants {
-            let wanted =
-                study.wanted(variant, scene, repeat).map_err(|error| error.at(format!("scene `{}`", scene.name)))?;
+    for repeat in 0..study.repeat.at_most {
+        for (variant, wanted) in study.variants.iter().zip(&wanted) {
+            let wanted = wanted.repeated(repeat);
             let picture = picture_name(&scene.name, &variant.name, repeat);
             let same = |run: &&Run| run.wanted == wanted && run.picture == picture;
             let done = earlier.runs.iter().find(same).filter(|run| folder.join(&run.picture).is_file()).cloned();
