@@ -6,7 +6,7 @@ use crate::config::quantity::LeafType;
 use crate::layout::{self, Placement, StateLeaf};
 use crate::plan::Plan;
 use crate::source::{Sources, Span};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
@@ -30,7 +30,7 @@ pub struct Report {
 }
 
 /// A table.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TableReport {
     /// Its name.
     pub name: String,
@@ -45,7 +45,7 @@ pub struct TableReport {
 }
 
 /// A stored leaf.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FieldReport {
     /// `eye.hit.prim`.
     pub name: String,
@@ -81,7 +81,7 @@ pub struct KernelReport {
 }
 
 /// A name and why it is there.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reason {
     /// The name.
     pub name: String,

@@ -2,6 +2,7 @@
 
 use crate::counters::Counters;
 use crate::device::Gpu;
+use crate::kernel_profile::KernelProfile;
 use crate::profile::ByKind;
 use crate::render::Rendered;
 use crate::settings::RenderFile;
@@ -38,6 +39,9 @@ pub struct Measurements {
     /// Milliseconds of device time that a pass spends in each kernel; unknown where the adapter has no timestamps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ms_per_pass: Option<IndexMap<String, f64>>,
+    /// What each kernel costs, where it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kernel_profile: Option<KernelProfile>,
 }
 
 /// Rays by kind.
@@ -83,8 +87,14 @@ impl Measurements {
             adapter: gpu.info.name.clone(),
             variant: RenderFile { state: None, ..settings.clone() },
             relative_error: relative.is_finite().then_some(relative),
+            kernel_profile: None,
             ms_per_pass: (rendered.profile.passes > 0).then(|| rendered.profile.kernel_milliseconds()),
         }
+    }
+
+    /// Wall-clock milliseconds for a million samples.
+    pub fn ms_per_msample(&self) -> f64 {
+        1e9 * self.seconds / (self.samples as f64).max(1.0)
     }
 
     /// Milliseconds for one sample of every pixel: the frame time of a progressive renderer.

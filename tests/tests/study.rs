@@ -8,6 +8,7 @@ use runtime::image_file::Image;
 use runtime::pyramid;
 use runtime::render::Progress;
 use runtime::settings::RenderFile;
+use runtime::study::results::Run;
 use runtime::study::{Observer, Outcome, Results, Study, run};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -185,6 +186,50 @@ fn assert_report(html: &str) {
     }
     assert!(html.contains("<svg") && html.contains("data:image/png;base64,"));
     assert_balanced(html);
+}
+
+/// What `rays` moves is known by hand: a path that reaches the light or leaves has one round.
+#[test]
+fn what_kernels_take_and_move_is_measured() {
+    let folder = Folder::new("kernels");
+    let axes = "[axes]\nlayout = [\"aos\", \"soa\"]\nschedule = [\"wavefront\", \"ordered\"]\npipeline = [\"pt\"]\n";
+    let scene = "[[scene]]\nname = \"cornell_box\"\nsize = [32, 24]\nspp = 4\nset = { max_edges = 3 }\n";
+    let (outcome, _) = run_small(&folder, &format!("title = \"Kernels\"\n{axes}{scene}"));
+    let results = &outcome.results;
+    assert_eq!(results.variants, ["aos x wavefront", "aos x ordered", "soa x wavefront", "soa x ordered"]);
+    let rate = results.copy_rate.as_ref().expect("the software device has timestamps");
+    assert!(rate.gb_per_s > 0.1 && rate.gb_per_s < 1e4 && rate.bytes >= 1 << 20, "{rate:?}");
+    for run in &results.runs {
+        assert_kernels(run);
+    }
+    let entries = |run: &Run| run.measured.kernel_profile.as_ref().map(|profile| profile.occupancy.clone());
+    let [first, rest @ ..] = results.runs.as_slice() else { panic!("four runs") };
+    // Neither layout nor order of queues decides where a path goes.
+    rest.iter().for_each(|run| assert_eq!(entries(run), entries(first), "{}", run.variant));
+}
+
+#[track_caller]
+fn assert_kernels(run: &Run) {
+    let profile = run.measured.kernel_profile.as_ref().expect("studies profile kernels");
+    let kernel = |name: &str| profile.kernels.iter().find(|kernel| kernel.name == name).expect("a kernel of `pt`");
+    let of = |name: &str| profile.occupancy.get(name).unwrap_or_else(|| panic!("{name} takes nothing"));
+    assert_eq!(of("emit_eye"), &[1.0], "every path begins once");
+    assert_eq!(of("trace_eye")[0], 1.0, "and is traced in the first round");
+    assert!(of("trace_eye").windows(2).all(|pair| pair[0] >= pair[1]), "no path comes back to life");
+    let walk_rays = (run.measured.rays.primary + run.measured.rays.secondary + run.measured.rays.deep) as f64;
+    let traced = walk_rays / run.measured.samples as f64;
+    assert!((kernel("trace_eye").entries_per_sample / traced - 1.0).abs() < 1e-9, "a ray a path traced");
+    let ended: f64 = ["shade", "escape"].iter().filter_map(|name| profile.occupancy.get(*name)).flatten().sum();
+    assert!((ended / traced - 1.0).abs() < 1e-9, "what is traced hits or misses");
+    let visibility = run.measured.rays.visibility as f64 / run.measured.samples as f64;
+    let resolved: f64 = of("resolve_connection").iter().sum();
+    assert!((resolved / visibility - 1.0).abs() < 1e-9, "a ray a connection");
+    for kernel in &profile.kernels {
+        assert!(kernel.compile_seconds > 0.0 && kernel.spirv_bytes > 100, "{kernel:?}");
+        let bytes = kernel.entries_per_sample * f64::from(kernel.load_bytes + kernel.store_bytes);
+        assert_eq!(kernel.gb_per_s.is_some(), bytes > 0.0, "{kernel:?}");
+        assert!(kernel.gb_per_s.is_none_or(|rate| rate > 0.0 && rate.is_finite()));
+    }
 }
 
 #[test]

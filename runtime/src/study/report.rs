@@ -6,6 +6,7 @@ use super::interval::Interval;
 use super::results::{Errors, Reference, Results, Run, difference_path};
 use crate::compare::Image;
 use crate::error::Error;
+use crate::kernel_profile::KernelProfile;
 use crate::picture::{Exposure, png, to_srgb};
 use crate::pyramid;
 use crate::settings::Aov;
@@ -84,10 +85,52 @@ const MEASURES: &[Measure] = &[
         chart: Some(Scale::Linear),
     },
     Measure {
+        title: "Wall-clock time of samples",
+        unit: "ms per million samples",
+        doc: "What the frame time is for a picture of a million pixels.",
+        value: |run| Some(run.measured.ms_per_msample()),
+        chart: None,
+    },
+    Measure {
+        title: "Device time of samples",
+        unit: "ms per million samples",
+        doc: "Sum over the kernels; what the wall clock has beyond it is waiting and launching.",
+        value: |run| kernels_of(run).and_then(KernelProfile::ms_per_msample),
+        chart: None,
+    },
+    Measure {
         title: "State",
         unit: "bytes per path",
         doc: "What is stored for a path between kernels.",
         value: |run| Some(f64::from(run.measured.bytes_per_path)),
+        chart: None,
+    },
+    Measure {
+        title: "Bytes moved",
+        unit: "bytes per sample",
+        doc: "State that kernels load and store, as the generator predicts: bytes of a path in a kernel, times the paths that it took.",
+        value: |run| kernels_of(run).map(KernelProfile::bytes_per_sample),
+        chart: Some(Scale::Linear),
+    },
+    Measure {
+        title: "Rate of state",
+        unit: "GB/s",
+        doc: "Bytes moved over the device time of all kernels; the tables of kernels show it one by one.",
+        value: |run| kernels_of(run).and_then(KernelProfile::gb_per_s),
+        chart: Some(Scale::Linear),
+    },
+    Measure {
+        title: "Compilation",
+        unit: "s",
+        doc: "Wall-clock time from WGSL to pipelines, all kernels side by side on all cores.",
+        value: |run| kernels_of(run).map(|kernels| kernels.compile_seconds),
+        chart: None,
+    },
+    Measure {
+        title: "SPIR-V",
+        unit: "bytes",
+        doc: "Size of all kernels as the driver gets them.",
+        value: |run| kernels_of(run).map(|kernels| kernels.spirv_bytes() as f64),
         chart: None,
     },
     Measure {
@@ -154,6 +197,10 @@ const MEASURES: &[Measure] = &[
         chart: None,
     },
 ];
+
+fn kernels_of(run: &Run) -> Option<&KernelProfile> {
+    run.measured.kernel_profile.as_ref()
+}
 
 /// A rate of rays that there are.
 fn rate(rays: u64, mrays_per_second: f64) -> Option<f64> {

@@ -3,10 +3,13 @@
 use super::file::Wanted;
 use crate::compare::metrics::block_mse;
 use crate::compare::{Image, block_z, check, metrics, zscore};
+use crate::copy_rate::CopyRate;
 use crate::error::Error;
 use crate::image_file::replace;
+use crate::kernel_profile::KernelProfile;
 use crate::measurements::Measurements;
 use crate::settings::SetValue;
+use kernelgen::report::{Reason, Report, TableReport};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +35,12 @@ pub struct Results {
     pub skipped: Vec<Skipped>,
     /// What pictures were measured against.
     pub references: Vec<Reference>,
+    /// The device's copy rate; unknown where it has no timestamps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copy_rate: Option<CopyRate>,
+    /// Where the state of each variant lives, scene by scene.
+    #[serde(default)]
+    pub states: Vec<State>,
     /// One entry a picture.
     pub runs: Vec<Run>,
 }
@@ -43,6 +52,34 @@ pub struct Skipped {
     pub scene: String,
     /// Why.
     pub reason: String,
+}
+
+/// Where the state of a variant lives on a scene.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct State {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the variant.
+    pub variant: String,
+    /// Bytes a path, all tables.
+    pub bytes_per_path: u32,
+    /// Its tables.
+    pub tables: Vec<TableReport>,
+    /// Fields that are stored nowhere, and why.
+    pub dead: Vec<Reason>,
+}
+
+impl State {
+    /// As the generator reports it.
+    pub fn of(scene: &str, variant: &str, report: &Report) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            variant: variant.to_owned(),
+            bytes_per_path: report.bytes_per_path,
+            tables: report.tables.clone(),
+            dead: report.dead.clone(),
+        }
+    }
 }
 
 /// What the pictures of a scene were measured against.
@@ -197,6 +234,7 @@ const COLUMNS: &[Column] = &[
     ("samples_per_pixel", |run| run.measured.samples_per_pixel.to_string()),
     ("samples", |run| run.measured.samples.to_string()),
     ("seconds", |run| run.measured.seconds.to_string()),
+    ("ms_per_msample", |run| run.measured.ms_per_msample().to_string()),
     ("ms_per_frame", |run| run.measured.ms_per_frame().to_string()),
     ("msamples_per_s", |run| run.measured.msamples_per_s.to_string()),
     ("rays_primary", |run| run.measured.rays.primary.to_string()),
@@ -208,7 +246,12 @@ const COLUMNS: &[Column] = &[
     ("mrays_per_s_deep", |run| run.measured.mrays_per_s.deep.to_string()),
     ("mrays_per_s_visibility", |run| run.measured.mrays_per_s.visibility.to_string()),
     ("device_ms_per_pass", |run| number(run.measured.ms_per_pass.as_ref().map(|times| times.values().sum()))),
+    ("device_ms_per_msample", |run| kernels(run, KernelProfile::ms_per_msample)),
     ("bytes_per_path", |run| run.measured.bytes_per_path.to_string()),
+    ("bytes_moved_per_sample", |run| kernels(run, |kernels| Some(kernels.bytes_per_sample()))),
+    ("gb_per_s", |run| kernels(run, KernelProfile::gb_per_s)),
+    ("compile_seconds", |run| kernels(run, |kernels| Some(kernels.compile_seconds))),
+    ("spirv_bytes", |run| kernels(run, |kernels| Some(kernels.spirv_bytes() as f64))),
     ("rejected", |run| run.measured.rejected.to_string()),
     ("mean_r", |run| run.mean[0].to_string()),
     ("mean_g", |run| run.mean[1].to_string()),
@@ -238,6 +281,10 @@ fn set(run: &Run) -> String {
 
 fn number(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| value.to_string())
+}
+
+fn kernels(run: &Run, value: fn(&KernelProfile) -> Option<f64>) -> String {
+    number(run.measured.kernel_profile.as_ref().and_then(value))
 }
 
 fn error(run: &Run, value: fn(&Errors) -> Option<f64>) -> String {
