@@ -10,9 +10,11 @@ use runtime::render::Progress;
 use runtime::settings::RenderFile;
 use runtime::study::results::Run;
 use runtime::study::{Observer, Outcome, Results, Study, run};
+use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, Mutex, PoisonError};
+use tests::browser;
 
 /// Two pipelines on two shipped scenes, and a scene that is not there.
 const SMALL: &str = r#"
@@ -117,7 +119,7 @@ fn assert_balanced(html: &str) {
         let name = tag.trim_start_matches('/').split_whitespace().next().unwrap_or("").trim_end_matches('/');
         if tag.starts_with('/') {
             assert_eq!(open.pop(), Some(name), "`</{name}>` closes something else");
-        } else if !(tag.ends_with('/') || tag.starts_with('!') || ["img", "meta"].contains(&name)) {
+        } else if !(tag.ends_with('/') || tag.starts_with('!') || ["img", "meta", "input"].contains(&name)) {
             open.push(name);
         }
     }
@@ -188,7 +190,32 @@ fn assert_report(html: &str) {
     assert_balanced(html);
 }
 
-/// What `rays` moves is known by hand: a path that reaches the light or leaves has one round.
+/// The words that each kernel of `rays` loads and stores, counted by hand.
+#[test]
+fn bytes_moved_are_those_counted_by_hand() {
+    let folder = Folder::new("bytes");
+    let variant = "[[variant]]\nname = \"rays\"\npipeline = \"rays\"\nlayout = \"soa\"\n";
+    let scene = "[[scene]]\nname = \"cornell_box\"\nsize = [32, 24]\nspp = 2\nset = { max_edges = 1 }\n";
+    let (outcome, _) = run_small(&folder, &format!("title = \"Bytes\"\n{variant}{scene}"));
+    let profile = outcome.results.runs[0].measured.kernel_profile.as_ref().expect("studies profile kernels");
+    let (position, direction, hit, length) = (3, 3, 4, 1);
+    let by_hand = [
+        ("emit_eye", 0, position + direction + length),
+        ("trace_eye", position + direction, hit),
+        ("probe", position + direction, 0),
+        ("bounce", position + direction + hit + length, position + direction + length),
+    ];
+    let mut bytes = 0.0;
+    for (name, loads, stores) in by_hand {
+        let kernel = profile.kernels.iter().find(|kernel| kernel.name == name).expect("a kernel of `rays`");
+        assert_eq!((kernel.load_bytes, kernel.store_bytes), (4 * loads, 4 * stores), "{name}");
+        let taken = kernel.entries_per_sample;
+        assert!(if name == "bounce" { taken > 0.5 && taken <= 1.0 } else { taken == 1.0 }, "{name} takes {taken}");
+        bytes += taken * f64::from(4 * (loads + stores));
+    }
+    assert!((profile.bytes_per_sample() / bytes - 1.0).abs() < 1e-12, "{} for {bytes}", profile.bytes_per_sample());
+}
+
 #[test]
 fn what_kernels_take_and_move_is_measured() {
     let folder = Folder::new("kernels");
@@ -230,6 +257,62 @@ fn assert_kernels(run: &Run) {
         assert_eq!(kernel.gb_per_s.is_some(), bytes > 0.0, "{kernel:?}");
         assert!(kernel.gb_per_s.is_none_or(|rate| rate > 0.0 && rate.is_finite()));
     }
+}
+
+/// What a browser makes of a page: pictures that it shows, texts that stick out of their drawings, what the slider does.
+const LOOK: &str = r#"
+    const images = [...document.images];
+    const outside = [...document.querySelectorAll("svg")].flatMap((svg) => {
+        const frame = svg.getBoundingClientRect();
+        const sticksOut = (text) => {
+            const box = text.getBoundingClientRect();
+            return Math.min(frame.left, box.left) !== frame.left || Math.max(frame.right, box.right) !== frame.right;
+        };
+        return [...svg.querySelectorAll("text")].filter(sticksOut).map((text) => text.textContent);
+    });
+    const box = document.querySelector(".compare");
+    const [left, right] = box.querySelectorAll("img");
+    const slider = box.querySelector("input");
+    const before = { left: left.alt, right: right.alt, clip: getComputedStyle(right).clipPath };
+    slider.value = "25";
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+    const select = box.querySelectorAll("select")[1];
+    select.selectedIndex = select.options.length - 1;
+    select.dispatchEvent(new Event("input", { bubbles: true }));
+    const chosen = document.getElementById(select.value);
+    const after = { right: right.alt, clip: getComputedStyle(right).clipPath, same: right.src === chosen.src };
+    return {
+        images: images.length,
+        loaded: images.filter((image) => image.complete && image.naturalWidth === 16).length,
+        requests: performance.getEntriesByType("resource").map((entry) => entry.name).filter((name) => !name.startsWith("data:")),
+        charts: document.querySelectorAll("svg.chart").length,
+        states: [...document.querySelectorAll("svg.state")].map((svg) => svg.querySelectorAll("rect.field").length),
+        outside,
+        before,
+        after,
+    };
+"#;
+
+#[test]
+fn the_report_opens_in_a_browser() {
+    let folder = Folder::new("browser");
+    let axes = "[axes]\nlayout = [\"aos\", \"soa\"]\n[defaults]\npipeline = \"nee\"\n";
+    let scene =
+        "[[scene]]\nname = \"cornell_box\"\nsize = [16, 16]\nspp = 4\nreference_variant = \"aos\"\nreference_spp = 8\n";
+    run_small(&folder, &format!("title = \"Browser\"\n{axes}{scene}"));
+    let Some(found) = browser::evaluate(&folder.0.join("report.html"), LOOK) else {
+        eprintln!("SKIPPED: no Chromium is installed; the report is not opened");
+        return;
+    };
+    assert_eq!(found["problems"], json!([]));
+    assert_eq!(found["requests"], json!([]), "the page needs no network and no file beside it");
+    assert_eq!(found["outside"], json!([]), "texts stick out of their drawings");
+    assert_eq!((&found["images"], &found["loaded"]), (&json!(7), &json!(7)), "5 figures and the slider's two");
+    assert_eq!(found["before"], json!({ "left": "reference", "right": "aos", "clip": "inset(0px 0px 0px 50%)" }));
+    assert_eq!(found["after"], json!({ "right": "soa, difference", "clip": "inset(0px 0px 0px 25%)", "same": true }));
+    let states = found["states"].as_array().expect("a list");
+    assert!(states.len() == 2 && states.iter().all(|fields| fields.as_u64() > Some(5)), "{states:?}");
+    assert!(found["charts"].as_u64() > Some(10), "{}", found["charts"]);
 }
 
 #[test]

@@ -4,6 +4,7 @@ pub mod axes;
 pub mod chart;
 pub mod file;
 pub mod interval;
+pub mod lines;
 pub mod report;
 pub mod results;
 pub mod run;

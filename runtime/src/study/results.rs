@@ -1,6 +1,7 @@
 //! What a study found: `results.json`, which also tells what need not be rendered again, and `results.csv`.
 
 use super::file::Wanted;
+use crate::compare::bias::Bias;
 use crate::compare::metrics::block_mse;
 use crate::compare::{Image, block_z, check, metrics, zscore};
 use crate::copy_rate::CopyRate;
@@ -132,6 +133,26 @@ pub struct Errors {
     pub block_mse: f64,
     /// That times the seconds of rendering: what is left after one second, where the error is noise alone.
     pub block_mse_seconds: f64,
+    /// How far its mean is off; `None` where the reference is black.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bias: Option<Bias>,
+}
+
+impl Run {
+    /// Variance of one sample of a pixel over the squared mean radiance, mean over pixels; unknown before the second batch.
+    pub fn variance(&self) -> Option<f64> {
+        let error = self.measured.relative_error?;
+        Some(error.powi(2) * f64::from(self.measured.samples_per_pixel))
+    }
+
+    /// Seconds after which noise and what is certain of the bias together are this part of the mean radiance; `None` where bias alone
+    /// is more, or noise unknown.
+    pub fn seconds_to(&self, relative: f64) -> Option<f64> {
+        let bias = self.errors.as_ref().and_then(|errors| errors.bias).map_or(0.0, |bias| bias.certain());
+        let room = relative.powi(2) - bias.powi(2);
+        let noise = self.measured.relative_error?.powi(2);
+        (room > 0.0).then(|| self.measured.seconds * noise / room)
+    }
 }
 
 impl Errors {
@@ -151,6 +172,7 @@ impl Errors {
             max_block_z: block_z(image, reference, BLOCK).as_deref().map(zscore::largest),
             block_mse,
             block_mse_seconds: block_mse * seconds,
+            bias: Bias::of(image, reference),
         })
     }
 
@@ -266,6 +288,10 @@ const COLUMNS: &[Column] = &[
     ("max_block_z", |run| error(run, |errors| errors.max_block_z)),
     ("block_mse", |run| error(run, |errors| Some(errors.block_mse))),
     ("block_mse_seconds", |run| error(run, |errors| Some(errors.block_mse_seconds))),
+    ("bias", |run| error(run, |errors| Some(errors.bias?.relative))),
+    ("bias_half_width", |run| error(run, |errors| errors.bias?.half_width)),
+    ("variance", |run| number(run.variance())),
+    ("seconds_to_1_percent", |run| number(run.seconds_to(0.01))),
     ("adapter", |run| run.measured.adapter.clone()),
     ("picture", |run| run.picture.clone()),
 ];
