@@ -240,10 +240,11 @@ impl Session {
             tallies.begin_pilot(&self.gpu);
         }
         let work = self.pixels() * u64::from(self.batch_samples(until));
+        let long = if let Until::Seconds(seconds) = until { seconds.min(WARM_UP_SECONDS) } else { WARM_UP_SECONDS };
         let start = Instant::now();
         loop {
             self.discarded(0, u64::from(self.pass_limit).min(work) as u32)?;
-            if start.elapsed().as_secs_f64() > WARM_UP_SECONDS {
+            if start.elapsed().as_secs_f64() > long {
                 break;
             }
         }

@@ -9,6 +9,7 @@ pub mod how_to;
 pub mod material;
 pub mod mutation;
 pub mod probe;
+pub mod program;
 pub mod refuse;
 pub mod rendering;
 pub mod scene_builder;

@@ -10,11 +10,13 @@ use runtime::render::Progress;
 use runtime::settings::RenderFile;
 use runtime::study::results::Run;
 use runtime::study::{Observer, Outcome, Results, Study, run};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::{LazyLock, Mutex, PoisonError};
 use tests::browser;
+use tests::program::program;
 
 /// Two pipelines on two shipped scenes, and a scene that is not there.
 const SMALL: &str = r#"
@@ -313,6 +315,32 @@ fn the_report_opens_in_a_browser() {
     let states = found["states"].as_array().expect("a list");
     assert!(states.len() == 2 && states.iter().all(|fields| fields.as_u64() > Some(5)), "{states:?}");
     assert!(found["charts"].as_u64() > Some(10), "{}", found["charts"]);
+}
+
+#[test]
+fn a_tuned_config_renders() {
+    let folder = Folder::new("tune");
+    fs::create_dir_all(&folder.0).expect("the temporary folder is writable");
+    let run = |arguments: &[&str]| {
+        let output = Command::new(program()).current_dir(&folder.0).args(arguments).output().expect("the program runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).expect("one JSON object")
+    };
+    let search = "study --tune cornell_box --pipeline nee --layouts aos,soa --schedules wavefront,inline --size 16x16 \
+                  --set max_edges=3 --budget 3 -o tuned --json";
+    let tuned = &run(&search.split_whitespace().collect::<Vec<_>>())["scenes"][0];
+    let candidates = tuned["candidates"].as_array().expect("a list");
+    let rounds: u64 = candidates.iter().filter_map(|candidate| candidate["rounds"].as_u64()).sum();
+    assert!(candidates.len() == 4 && (1..=6).contains(&rounds), "all once, then two of them: {tuned}");
+    let best = &candidates[0];
+    assert!(best["ms_per_msample"].as_f64().is_some_and(|time| time > 0.0), "{tuned}");
+    assert_eq!((&best["layout"], &best["schedule"]), (&tuned["layout"], &tuned["schedule"]));
+
+    let rendered = run(&["render", "tuned/cornell_box.toml", "--spp", "1", "-o", "tuned.exr", "--json"]);
+    let variant = &rendered["variant"];
+    assert_eq!((&variant["layout"], &variant["schedule"]), (&tuned["layout"], &tuned["schedule"]));
+    assert_eq!((&variant["pipeline"], &variant["size"]), (&json!("nee"), &json!([16, 16])));
+    assert_eq!(rendered["rejected"], 0);
 }
 
 #[test]

@@ -3,11 +3,13 @@
 pub mod axes;
 pub mod chart;
 pub mod file;
+pub mod halving;
 pub mod interval;
 pub mod lines;
 pub mod report;
 pub mod results;
 pub mod run;
+pub mod tune;
 
 pub use file::Study;
 pub use results::Results;

@@ -437,7 +437,8 @@ fn scene_settings(settings: &RenderFile) -> RenderFile {
     }
 }
 
-fn render_settings(settings: &RenderFile) -> Settings {
+/// What a session is told.
+pub(super) fn render_settings(settings: &RenderFile) -> Settings {
     Settings { size: settings.size.unwrap_or_default(), seed: settings.seed.unwrap_or(0), paths: None }
 }
 
@@ -448,7 +449,11 @@ fn work(until: Until) -> Option<u32> {
     }
 }
 
-fn generate(settings: &RenderFile, effects: Effects) -> Result<Generated, Error> {
+/// Generates a variant.
+///
+/// # Errors
+/// User input, when a name is unknown or the generator refuses the variant.
+pub(super) fn generate(settings: &RenderFile, effects: Effects) -> Result<Generated, Error> {
     let mut library = Library::default();
     let selection = settings.selection(&mut library, effects)?;
     let generated = kernelgen::generate(&library.sources, &selection)

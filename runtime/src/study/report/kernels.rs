@@ -92,12 +92,16 @@ fn of_variant(variant: &str, profile: &KernelProfile, copy_rate: Option<f64>) ->
 
 /// Paths that wait for each kernel, round by round.
 fn occupancy(variant: &str, profile: &KernelProfile) -> String {
-    let points = |rounds: &Vec<f64>| rounds.iter().enumerate().map(|(round, &paths)| [round as f64, paths]).collect();
+    // A stream that is emptied once, behind the rounds, is a point.
+    let points = |rounds: &[f64]| -> Vec<[f64; 2]> {
+        let rounds = rounds.iter().enumerate().map(|(round, &paths)| [round as f64, paths]);
+        rounds.skip_while(|point| point[1] == 0.0).collect()
+    };
     let lines: Vec<Line> = profile
         .occupancy
         .iter()
         .filter(|(_, rounds)| rounds.len() > 1)
-        .map(|(name, rounds)| Line { name: name.clone(), points: points(rounds), marks: Vec::new() })
+        .map(|(name, rounds)| Line { name: name.clone(), points: points(rounds), marks: points(rounds) })
         .collect();
     if lines.is_empty() {
         return String::new();

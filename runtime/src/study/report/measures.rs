@@ -241,7 +241,7 @@ fn section_of(measure: &Measure, results: &Results) -> String {
     }
     let cells = |of: &Vec<Vec<f64>>| of.iter().map(|values| cell(values)).collect();
     let rows: Vec<(String, Vec<String>)> = results.variants.iter().cloned().zip(values.iter().map(cells)).collect();
-    let mut inner = element("p", "", &escape(measure.doc)) + &table("variant", &results.scenes, &rows);
+    let mut inner = table("variant", &results.scenes, &rows);
     if let Some(scale) = measure.chart {
         let chart = Chart {
             title: measure.title,
@@ -254,6 +254,7 @@ fn section_of(measure: &Measure, results: &Results) -> String {
         };
         inner += &chart.svg();
     }
+    let inner = element("p", "", &escape(measure.doc)) + &element("div", "class=\"beside\"", &inner);
     section(&format!("{} [{}]", measure.title, measure.unit), &inner)
 }
 
@@ -268,8 +269,10 @@ fn mean(values: &[f64]) -> Option<f64> {
 /// The mean of the repetitions, with half its 95 % confidence interval where there are several.
 fn cell(values: &[f64]) -> String {
     match Interval::of(values) {
-        Some(Interval { mean, half_width: Some(half_width) }) => format!("{} ± {}", shown(mean), shown(half_width)),
-        Some(Interval { mean, half_width: None }) => shown(mean),
+        Some(Interval { mean, half_width: Some(half_width) }) if half_width > 0.0 => {
+            format!("{} ± {}", shown(mean), shown(half_width))
+        }
+        Some(Interval { mean, .. }) => shown(mean),
         None => String::new(),
     }
 }
@@ -280,6 +283,6 @@ mod tests {
 
     #[test]
     fn repetitions_show_their_spread() {
-        assert_eq!([cell(&[]), cell(&[2.0]), cell(&[1.0, 3.0])], ["", "2", "2 ± 12.71"]);
+        assert_eq!([cell(&[]), cell(&[2.0]), cell(&[2.0, 2.0]), cell(&[1.0, 3.0])], ["", "2", "2", "2 ± 12.71"]);
     }
 }

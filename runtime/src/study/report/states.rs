@@ -45,23 +45,23 @@ pub fn section_of(results: &Results) -> String {
     }
     let doc = "Each row is one lane: the words that one access moves; bit 0 of a word is on its left. Fields of one instance have one \
                colour. Fields above each other share their bits, for they are never alive together.";
-    let figures: String = groups.iter().map(|(state, users)| of_state(state, users)).collect();
+    let instances = instances(&results.states);
+    let figures: String = groups.iter().map(|(state, users)| of_state(state, users, &instances)).collect();
     section("State", &(element("p", "", doc) + &figures))
 }
 
-fn of_state(state: &State, users: &BTreeMap<&str, Vec<&str>>) -> String {
+fn of_state(state: &State, users: &BTreeMap<&str, Vec<&str>>, instances: &[&str]) -> String {
     let users: Vec<String> =
         users.iter().map(|(variant, scenes)| format!("{variant} ({})", scenes.join(", "))).collect();
     let title = format!("{}: {} bytes a path", users.join("; "), state.bytes_per_path);
-    let instances = instances(state);
-    let pictures: String = state.tables.iter().map(|table| of_table(table, &instances)).collect();
+    let pictures: String = state.tables.iter().map(|table| of_table(table, instances)).collect();
     element("h3", "", &escape(&title)) + &pictures + &fields(state) + &dead(state)
 }
 
-/// Names of instances, in the order in which their fields come: what their colours go by.
-fn instances(state: &State) -> Vec<&str> {
+/// Names of instances, in the order in which their fields come: what their colours go by on the whole page.
+fn instances(states: &[State]) -> Vec<&str> {
     let mut names = Vec::new();
-    for field in state.tables.iter().flat_map(|table| &table.fields) {
+    for field in states.iter().flat_map(|state| &state.tables).flat_map(|table| &table.fields) {
         let name = instance(field);
         if !names.contains(&name) {
             names.push(name);
