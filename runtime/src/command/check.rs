@@ -143,7 +143,8 @@ fn cases(library: &mut Library, files: &[String], scenes: &[(&'static str, Effec
             all.push(render(library, RenderFile::parse(text, &format!("configs/renders/{name}.toml"))?)?);
         }
         for name in Axis::Study.names() {
-            all.extend(study(library, &Study::load(name)?)?);
+            let new = study(library, &Study::load(name)?)?;
+            all.extend(new.into_iter().filter(|selection| !all.contains(selection)).collect::<Vec<_>>());
         }
         all
     } else {

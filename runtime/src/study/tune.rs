@@ -96,6 +96,7 @@ pub fn tune(search: &Search, gpu: &Gpu, watch: &mut dyn FnMut(&str) -> bool) -> 
     Ok(Tuned { candidates, winner: search.settings.clone().overlaid(over), seconds: start.elapsed().as_secs_f64() })
 }
 
+/// Every layout with every schedule, the default ones first: a small budget may not reach the last.
 fn candidates(search: &Search) -> Vec<Candidate> {
     let words = |given: &[String], axis: Axis| match given {
         [] => axis.names().into_iter().map(str::to_owned).collect(),
@@ -111,7 +112,11 @@ fn candidates(search: &Search) -> Vec<Candidate> {
             left_out: None,
         })
     };
-    words(&search.layouts, Axis::Layout).into_iter().flat_map(with_each).collect()
+    let mut all: Vec<Candidate> = words(&search.layouts, Axis::Layout).into_iter().flat_map(with_each).collect();
+    let other = |word: &str, default: &Option<String>| default.as_deref() != Some(word);
+    let RenderFile { layout, schedule, .. } = &search.settings;
+    all.sort_by_key(|candidate| (other(&candidate.schedule, schedule), other(&candidate.layout, layout)));
+    all
 }
 
 /// Generates a candidate, or notes why it is left out.
