@@ -21,6 +21,8 @@ pub struct Plan {
     pub program: Vec<Step>,
     /// Words of the control buffer that the host reads after a pass; all are zeroed by the program's first step and count one pass.
     pub counters: Vec<Counter>,
+    /// Where the control buffer says how many entries the kernel of each queue takes.
+    pub entries: EntryWords,
     /// Tallies, where kernels use one: each has its own part of the buffers of `Role::TallyCounts` and `Role::TallyRates`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tallies: Vec<Tally>,
@@ -48,6 +50,23 @@ pub struct Needs {
     pub int64_atomics: bool,
     /// `atomic<f32>`.
     pub float32_atomics: bool,
+}
+
+/// Words of the control buffer, one for each triple of the arguments buffer: from when the kernels before an indirect dispatch are done
+/// until it is, the word holds how many paths, or records of a stream, it takes.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct EntryWords {
+    /// That of triple 0.
+    pub first: u32,
+    /// From one to the next.
+    pub stride: u32,
+}
+
+impl EntryWords {
+    /// The word of a triple.
+    pub fn of_slot(self, slot: u32) -> u32 {
+        self.first + self.stride * slot
+    }
 }
 
 /// A tally's part of the counts and rates.

@@ -6,7 +6,7 @@ use crate::config::quantity::LeafType;
 use crate::layout::{self, Placement, StateLeaf};
 use crate::plan::Plan;
 use crate::source::{Sources, Span};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -32,7 +32,7 @@ pub struct Report {
 }
 
 /// A table.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TableReport {
     /// Its name.
     pub name: String,
@@ -47,7 +47,7 @@ pub struct TableReport {
 }
 
 /// A stored leaf.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FieldReport {
     /// `eye.hit.prim`.
     pub name: String,
@@ -68,7 +68,7 @@ pub struct FieldReport {
 }
 
 /// Bits of a word of the path's record.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
     /// The word.
     pub word: u32,
@@ -96,7 +96,7 @@ pub struct KernelReport {
 }
 
 /// A name and why it is there.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reason {
     /// The name.
     pub name: String,

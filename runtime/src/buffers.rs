@@ -96,7 +96,8 @@ fn size_of(buffer: &Buffer, path_count: u64, pixels: u64) -> u64 {
     buffer.size.fixed + buffer.size.per_path * path_count + buffer.size.per_pixel * pixels
 }
 
-fn binding_limit(gpu: &Gpu) -> u64 {
+/// The most bytes that a kernel can bind at once.
+pub(crate) fn binding_limit(gpu: &Gpu) -> u64 {
     let limits = gpu.device.limits();
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }

@@ -1,15 +1,18 @@
 //! Runs a plan: pipelines, passes in flight. Knows no stage and no field by name.
 
+mod count;
+
 use crate::buffers::Buffers;
 use crate::counters::Counters;
 use crate::device::{Gpu, mapped};
 use crate::error::Error;
-use crate::profile::{Profile, Queries};
+use crate::profile::{Measured, Profile, Queries};
 use crate::program::{Command, Extent, commands};
 use bytemuck::{Pod, Zeroable};
 use kernelgen::plan::{Access, Kernel, Plan, Role};
 use rayon::prelude::*;
 use std::collections::VecDeque;
+use std::time::Instant;
 
 /// Widest dispatch in one dimension.
 const WIDEST: u32 = 65_535;
@@ -40,6 +43,17 @@ pub struct Pass {
 struct Pipeline {
     pipeline: wgpu::ComputePipeline,
     bindings: wgpu::BindGroup,
+    /// Time that its compilation took, s.
+    seconds: f64,
+}
+
+/// What the compilation of a plan took.
+#[derive(Clone, Debug, Default)]
+pub struct Compiled {
+    /// Wall-clock time of all kernels, which are compiled side by side on all cores, s.
+    pub seconds: f64,
+    /// Time of each kernel, in the order of the plan, s.
+    pub by_kernel: Vec<f64>,
 }
 
 #[derive(Debug)]
@@ -48,6 +62,7 @@ struct Flight {
     staging: wgpu::Buffer,
     profiled: bool,
     first: bool,
+    active: u32,
 }
 
 /// A plan ready to run.
@@ -66,6 +81,8 @@ pub struct Executor {
     flying: VecDeque<Flight>,
     queries: Option<Queries>,
     warm: bool,
+    /// What the compilation took.
+    pub compiled: Compiled,
     /// Times of the passes that were measured.
     pub profile: Profile,
 }
@@ -76,11 +93,14 @@ impl Executor {
     /// # Errors
     /// Failed, when a kernel does not compile or memory runs out.
     pub fn new(gpu: &Gpu, plan: &Plan, buffers: &Buffers) -> Result<Self, Error> {
+        let start = Instant::now();
         let pipelines = plan
             .kernels
             .par_iter()
             .map(|kernel| pipeline(gpu, plan, kernel, buffers))
             .collect::<Result<Vec<_>, Error>>()?;
+        let by_kernel = pipelines.iter().map(|pipeline| pipeline.seconds).collect();
+        let compiled = Compiled { seconds: start.elapsed().as_secs_f64(), by_kernel };
         let arguments = plan.buffers.iter().position(|buffer| buffer.role == Role::Arguments);
         let counters: Vec<_> = plan.counters.iter().map(|counter| (counter.name.clone(), counter.word)).collect();
         let words = counters.iter().map(|(_, word)| u64::from(*word));
@@ -91,8 +111,9 @@ impl Executor {
             workgroups: plan.kernels.iter().map(|kernel| kernel.workgroup).collect(),
             queries: None,
             warm: false,
+            compiled,
             profile: Profile::new(plan),
-            program: commands(&plan.program),
+            program: commands(plan),
             arguments: arguments.and_then(|index| buffers.all[index].clone()),
             pass: buffers.of(plan, Role::Pass)?.clone(),
             control: buffers.of(plan, Role::Control)?.clone(),
@@ -161,7 +182,7 @@ impl Executor {
             queries.map();
         }
         let first = !std::mem::replace(&mut self.warm, true);
-        self.flying.push_back(Flight { submission, staging, profiled, first });
+        self.flying.push_back(Flight { submission, staging, profiled, first, active: pass.active });
         self.gpu.check()
     }
 
@@ -173,9 +194,6 @@ impl Executor {
             queries.stamp(&mut compute, 0);
         }
         for (index, command) in self.program.iter().enumerate() {
-            let pipeline = &self.pipelines[command.kernel];
-            compute.set_pipeline(&pipeline.pipeline);
-            compute.set_bind_group(0, &pipeline.bindings, &[]);
             self.dispatch(&mut compute, command, active);
             if let Some(queries) = queries {
                 queries.stamp(&mut compute, index + 1);
@@ -184,6 +202,9 @@ impl Executor {
     }
 
     fn dispatch(&self, compute: &mut wgpu::ComputePass, command: &Command, active: u32) {
+        let pipeline = &self.pipelines[command.kernel];
+        compute.set_pipeline(&pipeline.pipeline);
+        compute.set_bind_group(0, &pipeline.bindings, &[]);
         match (command.extent, &self.arguments) {
             (Extent::Indirect(offset), Some(arguments)) => compute.dispatch_workgroups_indirect(arguments, offset),
             (Extent::Active, _) => {
@@ -206,7 +227,8 @@ impl Executor {
         let counters = self.counted_in(&bytes);
         if let Some(queries) = self.queries.as_ref().filter(|_| flight.profiled) {
             let times = queries.read(&self.gpu)?;
-            self.profile.add(&self.program, &times, &counters, flight.first);
+            let measured = Measured { times: &times, slots: flight.active, cold: flight.first };
+            self.profile.add(&self.program, &measured, &counters);
         }
         counters.refuse_losses()?;
         Ok(counters)
@@ -226,6 +248,7 @@ impl Executor {
 }
 
 fn pipeline(gpu: &Gpu, plan: &Plan, kernel: &Kernel, buffers: &Buffers) -> Result<Pipeline, Error> {
+    let start = Instant::now();
     let name = kernel.name.as_str();
     let module = gpu.module(name, &kernel.module)?;
     let layout = bind_group_layout(gpu, kernel)?;
@@ -249,7 +272,7 @@ fn pipeline(gpu: &Gpu, plan: &Plan, kernel: &Kernel, buffers: &Buffers) -> Resul
             cache: None,
         })
     })?;
-    Ok(Pipeline { pipeline, bindings })
+    Ok(Pipeline { pipeline, bindings, seconds: start.elapsed().as_secs_f64() })
 }
 
 fn bind_group_layout(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::BindGroupLayout, Error> {

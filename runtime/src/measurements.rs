@@ -2,6 +2,7 @@
 
 use crate::counters::Counters;
 use crate::device::Gpu;
+use crate::kernel_profile::KernelProfile;
 use crate::profile::ByKind;
 use crate::render::Rendered;
 use crate::settings::RenderFile;
@@ -22,8 +23,11 @@ pub struct Measurements {
     pub msamples_per_s: f64,
     /// Rays traced.
     pub rays: Rays,
-    /// State that is stored for a path between kernels, bytes.
+    /// State that is stored for a path between kernels, bytes; rays in flight left out where the layout keeps them apart.
     pub bytes_per_path: u32,
+    /// Rays in flight of a path, bytes, where the layout keeps them apart.
+    #[serde(default)]
+    pub ray_bytes_per_path: u32,
     /// Millions of rays per second, by kind.
     pub mrays_per_s: ByKind,
     /// Contributions that the film refused: not finite, or negative.
@@ -38,6 +42,9 @@ pub struct Measurements {
     /// Milliseconds of device time that a pass spends in each kernel; unknown where the adapter has no timestamps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ms_per_pass: Option<IndexMap<String, f64>>,
+    /// What each kernel costs, where it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kernel_profile: Option<KernelProfile>,
 }
 
 /// Rays by kind.
@@ -78,13 +85,20 @@ impl Measurements {
             msamples_per_s: samples as f64 * 1e-6 / rendered.seconds.max(1e-9),
             rays: counters.into(),
             bytes_per_path: generated.plan.bytes_per_path,
+            ray_bytes_per_path: generated.plan.ray_bytes_per_path,
             mrays_per_s: rendered.profile.mrays_per_second(counters, rendered.seconds),
             rejected: counters.rejected,
             adapter: gpu.info.name.clone(),
             variant: RenderFile { state: None, ..settings.clone() },
             relative_error: relative.is_finite().then_some(relative),
+            kernel_profile: None,
             ms_per_pass: (rendered.profile.passes > 0).then(|| rendered.profile.kernel_milliseconds()),
         }
+    }
+
+    /// Wall-clock milliseconds for a million samples.
+    pub fn ms_per_msample(&self) -> f64 {
+        1e9 * self.seconds / (self.samples as f64).max(1.0)
     }
 
     /// Milliseconds for one sample of every pixel: the frame time of a progressive renderer.

@@ -93,6 +93,17 @@ pub struct ByKind {
     pub visibility: f64,
 }
 
+/// A measured pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured<'a> {
+    /// The duration of every dispatch, ns.
+    pub times: &'a [f64],
+    /// Slots in use.
+    pub slots: u32,
+    /// Whether it was the first of all, in which drivers compile and clear.
+    pub cold: bool,
+}
+
 /// Times of measured passes.
 #[derive(Clone, Debug, Default)]
 pub struct Profile {
@@ -104,6 +115,8 @@ pub struct Profile {
     cold: bool,
     /// Passes that were measured.
     pub passes: u32,
+    /// Slots in use in them.
+    slots: u64,
 }
 
 impl Profile {
@@ -117,14 +130,13 @@ impl Profile {
         }
     }
 
-    /// Adds a measured pass: the duration of every dispatch in ns, and the rays it counted. A `cold` one, the first of all, in
-    /// which drivers compile and clear, counts only until there is another.
-    pub fn add(&mut self, program: &[Command], times: &[f64], counters: &Counters, cold: bool) {
-        if self.cold && !cold {
+    /// Adds a measured pass and the rays it counted. A `cold` one counts only until there is another.
+    pub fn add(&mut self, program: &[Command], measured: &Measured, counters: &Counters) {
+        if self.cold && !measured.cold {
             self.forget();
         }
-        self.cold = cold;
-        for (command, &time) in program.iter().zip(times) {
+        self.cold = measured.cold;
+        for (command, &time) in program.iter().zip(measured.times) {
             self.kernel_ns[command.kernel] += time;
             match (self.kinds[command.kernel], command.round) {
                 (Some(RayKind::Walk), 0) => self.kind_ns.primary += time,
@@ -136,6 +148,7 @@ impl Profile {
         }
         self.rays.add(counters);
         self.passes += 1;
+        self.slots += u64::from(measured.slots);
     }
 
     fn forget(&mut self) {
@@ -143,12 +156,18 @@ impl Profile {
         self.kind_ns = ByKind::default();
         self.rays = Counters::default();
         self.passes = 0;
+        self.slots = 0;
     }
 
     /// Milliseconds a measured pass spent in each kernel, on average.
     pub fn kernel_milliseconds(&self) -> IndexMap<String, f64> {
         let scale = 1e-6 / f64::from(self.passes.max(1));
         self.names.iter().cloned().zip(self.kernel_ns.iter().map(|time| time * scale)).collect()
+    }
+
+    /// Nanoseconds a slot in use spent in each kernel, in the order of the plan; `None` without measured passes.
+    pub fn ns_per_slot(&self) -> Option<Vec<f64>> {
+        (self.slots > 0).then(|| self.kernel_ns.iter().map(|time| time / self.slots as f64).collect())
     }
 
     /// Millions of rays per second by kind: measured rays over the time of the kernels that trace this kind. A kind that no kernel

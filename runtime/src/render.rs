@@ -4,8 +4,9 @@ use crate::buffers::{Buffers, Resources, choose_path_count, usable_slots};
 use crate::counters::Counters;
 use crate::device::Gpu;
 use crate::error::Error;
-use crate::execute::{Executor, IN_FLIGHT, Pass};
+use crate::execute::{Compiled, Executor, IN_FLIGHT, Pass};
 use crate::film::{Accumulator, Totals, shares};
+use crate::occupancy::Occupancy;
 use crate::profile::Profile;
 use crate::tallies::{PILOT_SEED, PILOT_SLOTS, Tallies};
 use kernelgen::plan::{Layers, Plan, Role};
@@ -22,6 +23,10 @@ const MEASURED_FIRST: u64 = 8;
 const MEASURED_EVERY: u64 = 16;
 /// How often the error is looked at when rendering until it is small, s.
 const ERROR_SECONDS: f64 = 1.0;
+/// How long a warm-up lasts, s: clocks of idle cards take some tenths of a second to rise.
+const WARM_UP_SECONDS: f64 = 0.2;
+/// The most passes whose queues are counted.
+const COUNTED_PASSES: u64 = 4;
 
 /// What is rendered, besides the plan and the scene.
 #[derive(Clone, Copy, Debug)]
@@ -77,6 +82,8 @@ pub struct Rendered {
     pub seconds: f64,
     /// Device times.
     pub profile: Profile,
+    /// What the compilation took.
+    pub compiled: Compiled,
 }
 
 impl Rendered {
@@ -223,22 +230,52 @@ impl Session {
         Ok(())
     }
 
+    /// Runs passes as those to come and throws them away: drivers compile at the first dispatch, clocks rise under load. Call before
+    /// `run`; neither the picture nor its counts and times know of it.
+    ///
+    /// # Errors
+    /// As `run`.
+    pub fn warm_up(&mut self, until: Until) -> Result<(), Error> {
+        if let Some(tallies) = &self.tallies {
+            tallies.begin_pilot(&self.gpu);
+        }
+        let work = self.pixels() * u64::from(self.batch_samples(until));
+        let long = if let Until::Seconds(seconds) = until { seconds.min(WARM_UP_SECONDS) } else { WARM_UP_SECONDS };
+        let start = Instant::now();
+        loop {
+            self.discarded(0, u64::from(self.pass_limit).min(work) as u32)?;
+            if start.elapsed().as_secs_f64() > long {
+                break;
+            }
+        }
+        self.accumulator.clear_film(&self.gpu);
+        self.tallies.as_ref().map_or(Ok(()), |tallies| tallies.forget(&self.gpu))
+    }
+
+    /// Runs a pass with the pilot's seed.
+    fn discarded(&mut self, done: u32, active: u32) -> Result<(), Error> {
+        let pass = pass_at(&self.settings, self.settings.seed ^ PILOT_SEED, 0, done.into(), active);
+        self.executor.submit(pass, false, |_| ())?;
+        self.executor.wait().map(drop)
+    }
+
+    fn pixels(&self) -> u64 {
+        u64::from(self.settings.size[0]) * u64::from(self.settings.size[1])
+    }
+
     /// Runs the program once for the rates that the first sample reads. Nothing else of it remains: neither light nor counts of rays.
     fn pilot(&mut self) -> Result<(), Error> {
         let Some(tallies) = self.tallies.as_mut().filter(|_| std::mem::take(&mut self.unpiloted)) else {
             return Ok(());
         };
         tallies.begin_pilot(&self.gpu);
-        let seed = self.settings.seed ^ PILOT_SEED;
         let mut done = 0;
         while done < PILOT_SLOTS {
             let active = self.pass_limit.min(PILOT_SLOTS - done);
-            let pass = pass_at(&self.settings, seed, 0, done.into(), active);
-            self.executor.submit(pass, false, |_| ())?;
-            self.executor.wait()?;
+            self.discarded(done, active)?;
             done += active;
         }
-        tallies.end_pilot(&self.gpu)?;
+        self.tallies.as_mut().map_or(Ok(()), |tallies| tallies.end_pilot(&self.gpu))?;
         self.accumulator.clear_film(&self.gpu);
         Ok(())
     }
@@ -430,7 +467,28 @@ impl Session {
             counters: self.counters,
             seconds: self.seconds,
             profile: self.executor.profile.clone(),
+            compiled: self.executor.compiled.clone(),
         })
+    }
+
+    /// Counts what each kernel takes in every round, in passes as those of the picture, at most four, spread over it. Their light stays
+    /// in the film, so nothing can follow.
+    ///
+    /// # Errors
+    /// Failed, when the device is lost.
+    pub fn occupancy(self) -> Result<Occupancy, Error> {
+        let natural = (u64::from(self.slots) / self.pixels()).max(1);
+        let work = self.pixels() * natural.min(self.samples.max(1).into());
+        let passes = work.div_ceil(self.pass_limit.into());
+        let counted = passes.min(COUNTED_PASSES);
+        let mut occupancy = Occupancy::new(self.executor.compiled.by_kernel.len());
+        for index in 0..counted {
+            let done = index * passes / counted * u64::from(self.pass_limit);
+            let active = u64::from(self.pass_limit).min(work - done) as u32;
+            let pass = pass_at(&self.settings, self.settings.seed, 0, done, active);
+            self.executor.count_entries(pass, &mut occupancy)?;
+        }
+        Ok(occupancy)
     }
 }
 

@@ -105,6 +105,14 @@ impl Tallies {
         Ok(())
     }
 
+    /// Zeroes what was counted on the device. No pass may be in flight.
+    ///
+    /// # Errors
+    /// Failed, when the device is lost.
+    pub fn forget(&self, gpu: &Gpu) -> Result<(), Error> {
+        self.take(gpu).map(drop)
+    }
+
     /// Takes over what was counted since the last time. No pass may be in flight.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! What the whole-system tests share: scenes built in memory, skies, and statistics; and the scenes that the repository ships.
 
 pub mod agreement;
+pub mod browser;
 pub mod closed_form;
 pub mod compared;
 pub mod glb;
@@ -9,6 +10,7 @@ pub mod material;
 pub mod mutation;
 pub mod poison;
 pub mod probe;
+pub mod program;
 pub mod refuse;
 pub mod rendering;
 pub mod scene_builder;

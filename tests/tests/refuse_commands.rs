@@ -1,12 +1,11 @@
 //! Command lines that must be refused: exit code, message, and that nothing is left behind.
-//!
-//! The program is found beside the tests: `cargo test --workspace` builds it.
 
 use runtime::image_file::Image;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Output};
+use tests::program::program;
 use tests::sky::Sky;
 
 /// The user's input is wrong.
@@ -70,19 +69,6 @@ impl Drop for Folder {
         // A folder that stays behind in the temporary one does no harm.
         drop(fs::remove_dir_all(&self.0));
     }
-}
-
-/// `pathloom` as cargo built it: `target/PROFILE/deps/TEST` runs `target/PROFILE/pathloom`.
-fn program() -> PathBuf {
-    let test = std::env::current_exe().expect("a test has a path");
-    let folder = test.parent().and_then(Path::parent).expect("a test lies in `deps`");
-    let program = folder.join(format!("pathloom{}", std::env::consts::EXE_SUFFIX));
-    assert!(
-        program.is_file(),
-        "{} is not there: `cargo test --workspace` or `cargo build` builds it",
-        program.display()
-    );
-    program
 }
 
 #[track_caller]
@@ -236,6 +222,17 @@ fn studies() {
     folder.refused(INPUT, &["study", "mine.toml"], &["mine.toml", "line 2", "unknown field `sp`"]);
     folder.write("taken", b"a file");
     folder.refused(INPUT, &["study", "seed/dark", "-o", "taken/out"], &["`taken` is not a folder"]);
+}
+
+#[test]
+fn tuning() {
+    refused("tune_budget", &["study", "--tune", "cornell_box"], &["--budget"]);
+    refused("tune_both", &["study", "seed/dark", "--tune", "cornell_box", "--budget", "1"], &["cannot be used with"]);
+    refused("tune_nothing", &["study"], &["STUDY.toml|NAME"]);
+    let scene = ["study", "--tune", "cornell_bx", "--budget", "1"];
+    refused("tune_scene", &scene, &["there is no scene `cornell_bx`", "did you mean `cornell_box`"]);
+    let layout = ["study", "--tune", "cornell_box", "--budget", "1", "--layouts", "aos,sao"];
+    refused("tune_layout", &layout, &["layout `sao`", "no layout named `sao`", "did you mean `soa`"]);
 }
 
 #[test]

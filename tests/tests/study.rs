@@ -1,6 +1,6 @@
 //! Studies: what a small one writes, what it does not render twice, and that every shipped one can be run.
 
-use kernelgen::config::model::Effects;
+use kernelgen::config::model::{Effects, Selection};
 use runtime::configs::{Axis, Library};
 use runtime::device::{DeviceOptions, Gpu};
 use runtime::error::Error;
@@ -8,10 +8,15 @@ use runtime::image_file::Image;
 use runtime::pyramid;
 use runtime::render::Progress;
 use runtime::settings::RenderFile;
+use runtime::study::results::Run;
 use runtime::study::{Observer, Outcome, Results, Study, run};
+use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::{LazyLock, Mutex, PoisonError};
+use tests::browser;
+use tests::program::program;
 
 /// Two pipelines on two shipped scenes, and a scene that is not there.
 const SMALL: &str = r#"
@@ -116,7 +121,7 @@ fn assert_balanced(html: &str) {
         let name = tag.trim_start_matches('/').split_whitespace().next().unwrap_or("").trim_end_matches('/');
         if tag.starts_with('/') {
             assert_eq!(open.pop(), Some(name), "`</{name}>` closes something else");
-        } else if !(tag.ends_with('/') || tag.starts_with('!') || ["img", "meta"].contains(&name)) {
+        } else if !(tag.ends_with('/') || tag.starts_with('!') || ["img", "meta", "input"].contains(&name)) {
             open.push(name);
         }
     }
@@ -187,6 +192,157 @@ fn assert_report(html: &str) {
     assert_balanced(html);
 }
 
+/// The words that each kernel of `rays` loads and stores, counted by hand.
+#[test]
+fn bytes_moved_are_those_counted_by_hand() {
+    let folder = Folder::new("bytes");
+    let variant = "[[variant]]\nname = \"rays\"\npipeline = \"rays\"\nlayout = \"soa\"\n";
+    let scene = "[[scene]]\nname = \"cornell_box\"\nsize = [32, 24]\nspp = 2\nset = { max_edges = 1 }\n";
+    let (outcome, _) = run_small(&folder, &format!("title = \"Bytes\"\n{variant}{scene}"));
+    let profile = outcome.results.runs[0].measured.kernel_profile.as_ref().expect("studies profile kernels");
+    let (position, direction, hit, length) = (3, 3, 4, 1);
+    let by_hand = [
+        ("emit_eye", 0, position + direction + length),
+        ("trace_eye", position + direction, hit),
+        ("probe", position + direction, 0),
+        ("bounce", position + direction + hit + length, position + direction + length),
+    ];
+    let mut bytes = 0.0;
+    for (name, loads, stores) in by_hand {
+        let kernel = profile.kernels.iter().find(|kernel| kernel.name == name).expect("a kernel of `rays`");
+        assert_eq!((kernel.load_bytes, kernel.store_bytes), (4 * loads, 4 * stores), "{name}");
+        let taken = kernel.entries_per_sample;
+        assert!(if name == "bounce" { taken > 0.5 && taken <= 1.0 } else { taken == 1.0 }, "{name} takes {taken}");
+        bytes += taken * f64::from(4 * (loads + stores));
+    }
+    assert!((profile.bytes_per_sample() / bytes - 1.0).abs() < 1e-12, "{} for {bytes}", profile.bytes_per_sample());
+}
+
+#[test]
+fn what_kernels_take_and_move_is_measured() {
+    let folder = Folder::new("kernels");
+    let axes = "[axes]\nlayout = [\"aos\", \"soa\"]\nschedule = [\"wavefront\", \"ordered\"]\npipeline = [\"pt\"]\n";
+    let scene = "[[scene]]\nname = \"cornell_box\"\nsize = [32, 24]\nspp = 4\nset = { max_edges = 3 }\n";
+    let (outcome, _) = run_small(&folder, &format!("title = \"Kernels\"\n{axes}{scene}"));
+    let results = &outcome.results;
+    assert_eq!(results.variants, ["aos x wavefront", "aos x ordered", "soa x wavefront", "soa x ordered"]);
+    let rate = results.copy_rate.as_ref().expect("the software device has timestamps");
+    assert!(rate.gb_per_s > 0.1 && rate.gb_per_s < 1e4 && rate.bytes >= 1 << 20, "{rate:?}");
+    for run in &results.runs {
+        assert_kernels(run);
+    }
+    let entries = |run: &Run| run.measured.kernel_profile.as_ref().map(|profile| profile.occupancy.clone());
+    let [first, rest @ ..] = results.runs.as_slice() else { panic!("four runs") };
+    // Neither layout nor order of queues decides where a path goes.
+    rest.iter().for_each(|run| assert_eq!(entries(run), entries(first), "{}", run.variant));
+}
+
+#[track_caller]
+fn assert_kernels(run: &Run) {
+    let profile = run.measured.kernel_profile.as_ref().expect("studies profile kernels");
+    let kernel = |name: &str| profile.kernels.iter().find(|kernel| kernel.name == name).expect("a kernel of `pt`");
+    let of = |name: &str| profile.occupancy.get(name).unwrap_or_else(|| panic!("{name} takes nothing"));
+    assert_eq!(of("emit_eye"), &[1.0], "every path begins once");
+    assert_eq!(of("trace_eye")[0], 1.0, "and is traced in the first round");
+    assert!(of("trace_eye").windows(2).all(|pair| pair[0] >= pair[1]), "no path comes back to life");
+    let walk_rays = (run.measured.rays.primary + run.measured.rays.secondary + run.measured.rays.deep) as f64;
+    let traced = walk_rays / run.measured.samples as f64;
+    assert!((kernel("trace_eye").entries_per_sample / traced - 1.0).abs() < 1e-9, "a ray a path traced");
+    let ended: f64 = ["shade", "escape"].iter().filter_map(|name| profile.occupancy.get(*name)).flatten().sum();
+    assert!((ended / traced - 1.0).abs() < 1e-9, "what is traced hits or misses");
+    let visibility = run.measured.rays.visibility as f64 / run.measured.samples as f64;
+    let resolved: f64 = of("resolve_connection").iter().sum();
+    assert!((resolved / visibility - 1.0).abs() < 1e-9, "a ray a connection");
+    for kernel in &profile.kernels {
+        assert!(kernel.compile_seconds > 0.0 && kernel.spirv_bytes > 100, "{kernel:?}");
+        let bytes = kernel.entries_per_sample * f64::from(kernel.load_bytes + kernel.store_bytes);
+        assert_eq!(kernel.gb_per_s.is_some(), bytes > 0.0, "{kernel:?}");
+        assert!(kernel.gb_per_s.is_none_or(|rate| rate > 0.0 && rate.is_finite()));
+    }
+}
+
+/// What a browser makes of a page: pictures that it shows, texts that stick out of their drawings, what the slider does.
+const LOOK: &str = r#"
+    const images = [...document.images];
+    const outside = [...document.querySelectorAll("svg")].flatMap((svg) => {
+        const frame = svg.getBoundingClientRect();
+        const sticksOut = (text) => {
+            const box = text.getBoundingClientRect();
+            return Math.min(frame.left, box.left) !== frame.left || Math.max(frame.right, box.right) !== frame.right;
+        };
+        return [...svg.querySelectorAll("text")].filter(sticksOut).map((text) => text.textContent);
+    });
+    const box = document.querySelector(".compare");
+    const [left, right] = box.querySelectorAll("img");
+    const slider = box.querySelector("input");
+    const before = { left: left.alt, right: right.alt, clip: getComputedStyle(right).clipPath };
+    slider.value = "25";
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+    const select = box.querySelectorAll("select")[1];
+    select.selectedIndex = select.options.length - 1;
+    select.dispatchEvent(new Event("input", { bubbles: true }));
+    const chosen = document.getElementById(select.value);
+    const after = { right: right.alt, clip: getComputedStyle(right).clipPath, same: right.src === chosen.src };
+    return {
+        images: images.length,
+        loaded: images.filter((image) => image.complete && image.naturalWidth === 16).length,
+        requests: performance.getEntriesByType("resource").map((entry) => entry.name).filter((name) => !name.startsWith("data:")),
+        charts: document.querySelectorAll("svg.chart").length,
+        states: [...document.querySelectorAll("svg.state")].map((svg) => svg.querySelectorAll("rect.field").length),
+        outside,
+        before,
+        after,
+    };
+"#;
+
+#[test]
+fn the_report_opens_in_a_browser() {
+    let folder = Folder::new("browser");
+    let axes = "[axes]\nlayout = [\"aos\", \"soa\"]\n[defaults]\npipeline = \"nee\"\n";
+    let scene =
+        "[[scene]]\nname = \"cornell_box\"\nsize = [16, 16]\nspp = 4\nreference_variant = \"aos\"\nreference_spp = 8\n";
+    run_small(&folder, &format!("title = \"Browser\"\n{axes}{scene}"));
+    let Some(found) = browser::evaluate(&folder.0.join("report.html"), LOOK) else {
+        eprintln!("SKIPPED: no Chromium is installed; the report is not opened");
+        return;
+    };
+    assert_eq!(found["problems"], json!([]));
+    assert_eq!(found["requests"], json!([]), "the page needs no network and no file beside it");
+    assert_eq!(found["outside"], json!([]), "texts stick out of their drawings");
+    assert_eq!((&found["images"], &found["loaded"]), (&json!(7), &json!(7)), "5 figures and the slider's two");
+    assert_eq!(found["before"], json!({ "left": "reference", "right": "aos", "clip": "inset(0px 0px 0px 50%)" }));
+    assert_eq!(found["after"], json!({ "right": "soa, difference", "clip": "inset(0px 0px 0px 25%)", "same": true }));
+    let states = found["states"].as_array().expect("a list");
+    assert!(states.len() == 2 && states.iter().all(|fields| fields.as_u64() > Some(5)), "{states:?}");
+    assert!(found["charts"].as_u64() > Some(10), "{}", found["charts"]);
+}
+
+#[test]
+fn a_tuned_config_renders() {
+    let folder = Folder::new("tune");
+    fs::create_dir_all(&folder.0).expect("the temporary folder is writable");
+    let run = |arguments: &[&str]| {
+        let output = Command::new(program()).current_dir(&folder.0).args(arguments).output().expect("the program runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).expect("one JSON object")
+    };
+    let search = "study --tune cornell_box --pipeline nee --layouts aos,soa --schedules wavefront,inline --size 16x16 \
+                  --set max_edges=3 --budget 3 -o tuned --json";
+    let tuned = &run(&search.split_whitespace().collect::<Vec<_>>())["scenes"][0];
+    let candidates = tuned["candidates"].as_array().expect("a list");
+    let rounds: u64 = candidates.iter().filter_map(|candidate| candidate["rounds"].as_u64()).sum();
+    assert!(candidates.len() == 4 && (1..=6).contains(&rounds), "all once, then two of them: {tuned}");
+    let best = &candidates[0];
+    assert!(best["ms_per_msample"].as_f64().is_some_and(|time| time > 0.0), "{tuned}");
+    assert_eq!((&best["layout"], &best["schedule"]), (&tuned["layout"], &tuned["schedule"]));
+
+    let rendered = run(&["render", "tuned/cornell_box.toml", "--spp", "1", "-o", "tuned.exr", "--json"]);
+    let variant = &rendered["variant"];
+    assert_eq!((&variant["layout"], &variant["schedule"]), (&tuned["layout"], &tuned["schedule"]));
+    assert_eq!((&variant["pipeline"], &variant["size"]), (&json!("nee"), &json!([16, 16])));
+    assert_eq!(rendered["rejected"], 0);
+}
+
 #[test]
 fn a_stopped_study_goes_on() {
     let folder = Folder::new("stopped");
@@ -200,9 +356,11 @@ fn a_stopped_study_goes_on() {
 #[test]
 fn repetitions_have_seeds_of_their_own() {
     let folder = Folder::new("repeat");
-    let (outcome, _) = run_small(&folder, &SMALL.replace("[defaults]", "repeat = 2\n[defaults]"));
+    // No time is known so well: it ends after the third.
+    let repeat = "repeat = { at_least = 2, at_most = 3, within = 1e-9 }";
+    let (outcome, _) = run_small(&folder, &SMALL.replace("[defaults]", &format!("{repeat}\n[defaults]")));
     let runs = outcome.results.of("slit_room", "nee");
-    assert_eq!(runs.len(), 2);
+    assert_eq!(runs.len(), 3);
     assert_ne!(runs[0].mean, runs[1].mean);
     assert_ne!(runs[0].picture, runs[1].picture);
     assert!(folder.text("report.html").contains(" ± "));
@@ -271,25 +429,31 @@ fn every_shipped_study_parses_and_its_variants_generate() {
     let effects = effects();
     assert!(!Axis::Study.names().is_empty(), "studies are shipped");
     let mut broken = Vec::new();
+    let mut generated = Vec::new();
     for name in Axis::Study.names() {
-        if let Err(error) = generate(name, &effects) {
+        if let Err(error) = generate(name, &effects, &mut generated) {
             broken.push(format!("{name}: {error}"));
         }
     }
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
-fn generate(name: &str, effects: &Effects) -> Result<(), String> {
+/// Generates what a study renders, unless it is among what was `generated` for another scene or study.
+fn generate(name: &str, effects: &Effects, generated: &mut Vec<Selection>) -> Result<(), String> {
     let study = Study::load(name).map_err(|error| error.to_string())?;
     for scene in &study.scenes {
         study.against(scene).map_err(|error| error.to_string())?;
         for variant in &study.variants {
-            let wanted = study.wanted(variant, scene, 0).map_err(|error| error.to_string())?;
+            let wanted = study.wanted(variant, scene).map_err(|error| error.to_string())?;
             let mut library = Library::default();
             let selection =
                 wanted.settings.selection(&mut library, effects.clone()).map_err(|error| error.to_string())?;
+            if generated.contains(&selection) {
+                continue;
+            }
             kernelgen::generate(&library.sources, &selection)
                 .map_err(|refusal| format!("variant `{}`: {}", variant.name, refusal.render(false)))?;
+            generated.push(selection);
         }
     }
     Ok(())

@@ -311,6 +311,7 @@ impl Builder<'_> {
             kernels: kernels.collect(),
             program,
             counters: counters.collect(),
+            entries: queue::entry_words(),
             tallies,
             layers: self.program.layers.to_vec(),
             film: self.program.variant.schedule.accumulate,

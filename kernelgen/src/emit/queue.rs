@@ -2,6 +2,7 @@
 
 use super::text::{stage_constant, stream_constant};
 use crate::config::model::QueueKind;
+use crate::plan::EntryWords;
 use std::fmt::Write;
 
 /// Words of the control buffer before those of the queues, by name; all but the last are counters that the host reads.
@@ -11,6 +12,11 @@ const WORDS: [&str; 8] =
 /// The counters that the host reads, with their words.
 pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
     WORDS.iter().copied().zip(0..).take(WORDS.len() - 1)
+}
+
+/// The words that say how many entries the kernel of a queue takes.
+pub(super) fn entry_words() -> EntryWords {
+    EntryWords { first: WORDS.len() as u32 + 1, stride: 2 }
 }
 
 /// Every queue of the program: one a kernel of the loop, one a batched stream.

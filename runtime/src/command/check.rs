@@ -143,7 +143,8 @@ fn cases(library: &mut Library, files: &[String], scenes: &[(&'static str, Effec
             all.push(render(library, RenderFile::parse(text, &format!("configs/renders/{name}.toml"))?)?);
         }
         for name in Axis::Study.names() {
-            all.extend(study(library, &Study::load(name)?)?);
+            let new = study(library, &Study::load(name)?)?;
+            all.extend(new.into_iter().filter(|selection| !all.contains(selection)).collect::<Vec<_>>());
         }
         all
     } else {
@@ -190,7 +191,7 @@ fn axis_of(path: &Path, text: &str) -> Axis {
     if table.get("pipeline").is_some_and(toml::Value::is_str) {
         return Axis::Render;
     }
-    if table.get("variant").is_some_and(toml::Value::is_array) {
+    if table.get("variant").is_some_and(toml::Value::is_array) || table.contains_key("axes") {
         return Axis::Study;
     }
     if let Some((_, axis)) = by_table.iter().find(|(key, _)| table.get(*key).is_some_and(toml::Value::is_table)) {
@@ -205,7 +206,7 @@ fn study(library: &mut Library, study: &Study) -> Result<Vec<Selection>, Error> 
     let mut all = Vec::new();
     for scene in &study.scenes {
         for variant in &study.variants {
-            let selection = study.wanted(variant, scene, 0)?.settings.selection(library, Effects::new())?;
+            let selection = study.wanted(variant, scene)?.settings.selection(library, Effects::new())?;
             if !all.contains(&selection) {
                 all.push(selection);
             }

@@ -84,7 +84,8 @@ impl DeviceArguments {
     }
 }
 
-fn key_value(text: &str) -> Result<(String, String), String> {
+/// A word as in `max_edges=8`.
+pub fn key_value(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or_else(|| "this is not KEY=VALUE, such as max_edges=8".to_owned())?;
     if key.trim().is_empty() || value.trim().is_empty() {
         return Err("both KEY and VALUE are needed, such as max_edges=8".to_owned());
@@ -92,7 +93,8 @@ fn key_value(text: &str) -> Result<(String, String), String> {
     Ok((key.trim().to_owned(), value.trim().to_owned()))
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+/// Width and height as in `640x360`.
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let parts = text.split_once(['x', 'X']);
     let parsed = parts.and_then(|(width, height)| Some([width.parse().ok()?, height.parse().ok()?]));
     match parsed {

@@ -10,6 +10,7 @@ mod progress;
 mod render;
 mod study;
 mod summary;
+mod tune;
 
 use clap::{Parser, Subcommand};
 use runtime::error::Error;
@@ -34,7 +35,7 @@ enum Command {
     Explain(explain::Arguments),
     /// Generates and validates every config, or the named ones; needs no GPU
     Check(check::Arguments),
-    /// Renders every variant of a study on every scene, and reports what they cost and how far off they are
+    /// Renders every variant of a study on every scene, and reports what they cost and how far off they are; or tunes for a scene
     Study(study::Arguments),
     /// Measures how far two images are apart
     Compare(compare::Arguments),

@@ -6,6 +6,8 @@ use super::{Failure, print, print_json, progress, say};
 use clap::Args;
 use runtime::error::Error;
 use runtime::image_file::Image;
+use runtime::kernel_profile::KernelProfile;
+use runtime::measurements::Measurements;
 use runtime::output::save;
 use runtime::picture::Exposure;
 use runtime::render::{Session, Settings, Until};
@@ -56,7 +58,7 @@ pub struct Arguments {
     /// The EXR file to write; the PNG goes beside it
     #[arg(short, long, value_name = "OUT.exr")]
     output: Option<PathBuf>,
-    /// Print the time each kernel takes
+    /// Print for each kernel its time, the paths it takes, bytes of state moved, compile time and size
     #[arg(long)]
     profile: bool,
     /// Print one JSON object
@@ -113,14 +115,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             output.display()
         ));
     }
-    let summary = Summary {
-        rendered: &rendered,
-        generated: &generated,
-        gpu: &gpu,
-        settings: &metadata,
-        outputs: &outputs,
-        profile: arguments.profile,
-    };
+    let mut measured = Measurements::of(&rendered, &generated, &gpu, &metadata);
+    if arguments.profile {
+        measured.kernel_profile = Some(KernelProfile::of(&generated.plan, &rendered, &session.occupancy()?)?);
+    }
+    let summary = Summary { rendered: &rendered, measured: &measured, outputs: &outputs };
     if arguments.json {
         print_json(&summary.json()?)?
     } else {

@@ -1,7 +1,7 @@
 //! `pathloom study`.
 
 use super::input::DeviceArguments;
-use super::{Failure, print, print_json, progress, say};
+use super::{Failure, print, print_json, progress, say, tune};
 use clap::Args;
 use indicatif::ProgressBar;
 use runtime::error::Error;
@@ -16,16 +16,18 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
     /// A study file, or a shipped study by name
-    #[arg(value_name = "STUDY.toml|NAME")]
-    study: String,
+    #[arg(value_name = "STUDY.toml|NAME", required_unless_present = "tune", conflicts_with = "tune")]
+    study: Option<String>,
     #[command(flatten)]
-    device: DeviceArguments,
-    /// The folder to write to; named after the study when not given
+    pub tuning: tune::Arguments,
+    #[command(flatten)]
+    pub device: DeviceArguments,
+    /// The folder to write to; named after the study when not given, `tuned` with --tune
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    pub output: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// Runs the study and says where its results are.
@@ -33,7 +35,8 @@ pub struct Arguments {
 /// # Errors
 /// User input, failed devices.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let study = Study::load(&arguments.study)?;
+    let Some(study) = &arguments.study else { return tune::run(arguments) };
+    let study = Study::load(study)?;
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from(&study.name));
     check_folder(&folder)?;
     let gpu = arguments.device.open()?;
@@ -52,7 +55,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// Better now than after hours of rendering.
-fn check_folder(folder: &Path) -> Result<(), Error> {
+///
+/// # Errors
+/// User input, when a file is in the way.
+pub fn check_folder(folder: &Path) -> Result<(), Error> {
     match folder.ancestors().find(|ancestor| ancestor.exists()).filter(|found| !found.is_dir()) {
         Some(file) => Err(Error::input(format!("the output `{}` cannot be put into a file", folder.display()))
             .help(format!("`{}` is not a folder", file.display()))),

@@ -1,11 +1,9 @@
 //! What `render` says at the end.
 
-use kernelgen::Generated;
-use runtime::device::Gpu;
 use runtime::error::Error;
+use runtime::kernel_profile::{KernelMeasurements, KernelProfile};
 use runtime::measurements::Measurements;
 use runtime::render::Rendered;
-use runtime::settings::RenderFile;
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -14,16 +12,10 @@ use std::path::PathBuf;
 pub struct Summary<'a> {
     /// The picture.
     pub rendered: &'a Rendered,
-    /// What ran.
-    pub generated: &'a Generated,
-    /// On what.
-    pub gpu: &'a Gpu,
-    /// The settings, state included.
-    pub settings: &'a RenderFile,
+    /// What was measured.
+    pub measured: &'a Measurements,
     /// The files written.
     pub outputs: &'a [PathBuf],
-    /// Whether times of kernels are shown.
-    pub profile: bool,
 }
 
 impl Summary<'_> {
@@ -32,14 +24,10 @@ impl Summary<'_> {
     /// # Errors
     /// Failed, when a number has no JSON form.
     pub fn json(&self) -> Result<Value, Error> {
-        let mut object = serde_json::to_value(self.measurements())
+        let mut object = serde_json::to_value(self.measured)
             .map_err(|error| Error::failed(format!("cannot write the results as JSON: {error}")))?;
         object["outputs"] = self.outputs.iter().map(|path| path.display().to_string()).collect();
         Ok(object)
-    }
-
-    fn measurements(&self) -> Measurements {
-        Measurements::of(self.rendered, self.generated, self.gpu, self.settings)
     }
 
     /// Lines for people.
@@ -53,35 +41,35 @@ impl Summary<'_> {
     }
 
     fn write(&self, out: &mut String) -> std::fmt::Result {
-        let rendered = self.rendered;
-        let counters = &rendered.counters;
+        let Self { rendered, measured, .. } = self;
         let [width, height] = rendered.size;
-        writeln!(out, "picture       {width}x{height}, {} samples per pixel", rendered.totals.samples)?;
+        writeln!(out, "picture       {width}x{height}, {} samples per pixel", measured.samples_per_pixel)?;
         writeln!(
             out,
             "time          {:.2} s, {:.2} Msamples/s on {}",
-            rendered.seconds,
-            self.measurements().msamples_per_s,
-            self.gpu.info.name
+            measured.seconds, measured.msamples_per_s, measured.adapter
         )?;
-        let rates = rendered.profile.mrays_per_second(counters, rendered.seconds);
+        let (rays, rates) = (&measured.rays, &measured.mrays_per_s);
         let kinds = [
-            ("primary", counters.primary, rates.primary),
-            ("secondary", counters.secondary, rates.secondary),
-            ("deep", counters.deep, rates.deep),
-            ("visibility", counters.visibility, rates.visibility),
+            ("primary", rays.primary, rates.primary),
+            ("secondary", rays.secondary, rates.secondary),
+            ("deep", rays.deep, rates.deep),
+            ("visibility", rays.visibility, rates.visibility),
         ];
         for (kind, count, rate) in kinds.iter().filter(|(_, count, _)| *count > 0) {
             writeln!(out, "{kind:<13} {:.2} Mrays, {rate:.1} Mrays/s", *count as f64 * 1e-6)?;
         }
-        writeln!(out, "state         {} bytes per path", self.generated.plan.bytes_per_path)?;
-        let relative = rendered.totals.relative_error();
-        if relative.is_finite() {
+        let rays = match measured.ray_bytes_per_path {
+            0 => String::new(),
+            bytes => format!(", and {bytes} of rays in flight"),
+        };
+        writeln!(out, "state         {} bytes per path{rays}", measured.bytes_per_path)?;
+        if let Some(relative) = measured.relative_error {
             writeln!(out, "error         {:.3} % of the mean radiance", relative * 100.0)?;
         }
-        writeln!(out, "rejected      {} contributions", counters.rejected)?;
-        if self.profile {
-            self.write_profile(out)?;
+        writeln!(out, "rejected      {} contributions", measured.rejected)?;
+        if let Some(profile) = &measured.kernel_profile {
+            self.write_profile(out, profile)?;
         }
         for path in self.outputs {
             writeln!(out, "written       {}", path.display())?;
@@ -89,15 +77,34 @@ impl Summary<'_> {
         Ok(())
     }
 
-    fn write_profile(&self, out: &mut String) -> std::fmt::Result {
-        let profile = &self.rendered.profile;
-        if profile.passes == 0 {
-            return writeln!(out, "kernels       not timed: the adapter has no timestamps inside passes");
+    fn write_profile(&self, out: &mut String, profile: &KernelProfile) -> std::fmt::Result {
+        match self.rendered.profile.passes {
+            0 => writeln!(out, "kernels       not timed: the adapter has no timestamps inside passes")?,
+            passes => writeln!(out, "kernels       times are means of {passes} measured passes")?,
         }
-        writeln!(out, "kernels       ms per pass, mean of {} measured passes", profile.passes)?;
-        for (name, milliseconds) in profile.kernel_milliseconds() {
-            writeln!(out, "  {milliseconds:>9.3}   {name}")?;
+        writeln!(out, "  ms/pass  ms/Msample  paths/sample  bytes/path    GB/s  compile s  SPIR-V B")?;
+        let times = self.measured.ms_per_pass.as_ref();
+        for kernel in &profile.kernels {
+            let time = times.and_then(|times| times.get(&kernel.name)).copied();
+            write_kernel(out, kernel, time)?;
         }
-        Ok(())
+        writeln!(out, "compilation   {:.2} s", profile.compile_seconds)
     }
+}
+
+fn write_kernel(out: &mut String, kernel: &KernelMeasurements, ms_per_pass: Option<f64>) -> std::fmt::Result {
+    let known =
+        |value: Option<f64>, decimals: usize| value.map_or(String::new(), |value| format!("{value:.decimals$}"));
+    writeln!(
+        out,
+        "{:>9}  {:>10}  {:>12.3}  {:>10}  {:>6}  {:>9.3}  {:>8}   {}",
+        known(ms_per_pass, 3),
+        known(kernel.ms_per_msample, 3),
+        kernel.entries_per_sample,
+        kernel.load_bytes + kernel.store_bytes,
+        known(kernel.gb_per_s, 2),
+        kernel.compile_seconds,
+        kernel.spirv_bytes,
+        kernel.name
+    )
 }

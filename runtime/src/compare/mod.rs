@@ -1,5 +1,6 @@
 //! How far two images are apart: error measures, and z-scores of block means.
 
+pub mod bias;
 pub mod metrics;
 pub mod zscore;
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::device::DeviceOptions;
 use crate::film::Sums;
 use kernelgen::config::model::{Accumulate, RayKind};
-use kernelgen::plan::{Access, Binding, Buffer, Counter, Kernel, Needs, SLOT_GRAIN, Size, Step};
+use kernelgen::plan::{Access, Binding, Buffer, Counter, EntryWords, Kernel, Needs, SLOT_GRAIN, Size, Step};
 
 const HEADER: &str = "
 override path_count: u32;
@@ -93,6 +93,8 @@ fn plan(film: Accumulate) -> Plan {
             Step::Loop { rounds: 2, body: vec![Step::Indirect { kernel: 3, slot: 1 }] },
         ],
         counters: vec![counter("rays_primary", 1), counter("rays_visibility", 2), counter("overflow", 4)],
+        // `deep` takes as many as `emit` has counted.
+        entries: EntryWords { first: 0, stride: 1 },
         tallies: Vec::new(),
         layers: Vec::new(),
         film,
@@ -185,6 +187,30 @@ fn rates_come_from_measured_passes() {
     let rates = rendered.profile.mrays_per_second(&rendered.counters, rendered.seconds);
     assert!(rates.primary > 0.0 && rates.visibility > 0.0);
     assert_eq!(rendered.profile.kernel_milliseconds().len(), 4);
+}
+
+#[test]
+fn a_warm_up_leaves_no_trace() {
+    let (gpu, plan) = (gpu(), plan(Accumulate::FixedI64));
+    let cold = render(&gpu, &plan, &nothing, settings(1024), 5).expect("a picture");
+    let mut session = Session::new(&gpu, &plan, &nothing, settings(1024), Some(5)).expect("a session");
+    session.warm_up(Until::Samples(5)).expect("a warm-up");
+    session.run(Until::Samples(5), &mut |_| true).expect("a render");
+    let warm = session.picture().expect("a picture");
+    assert_eq!((warm.totals.sums, warm.counters), (cold.totals.sums, cold.counters));
+    assert!(warm.profile.passes > 0);
+}
+
+#[test]
+fn entries_are_counted_round_by_round() {
+    let mut plan = plan(Accumulate::AtomicF32);
+    plan.kernels[1].stages = vec!["emit".to_owned()];
+    let mut session = Session::new(&gpu(), &plan, &nothing, settings(1024), Some(2)).expect("a session");
+    session.run(Until::Samples(2), &mut |_| true).expect("a render");
+    let occupancy = session.occupancy().expect("the device is there");
+    // 2100 pixels in passes of 1024 slots: two are full, the third has the rest.
+    assert_eq!((occupancy.slots, occupancy.passes), (2100, 3));
+    assert_eq!(occupancy.entries, [vec![], vec![2100], vec![], vec![2100, 2100]], "`deep` takes all, in both rounds");
 }
 
 #[test]

@@ -3,15 +3,15 @@
 /// Colours that most colour-blind people tell apart (Okabe and Ito 2008).
 const COLOURS: [&str; 8] = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#8a8a8a", "#b8a800"];
 /// Height of the plot, and the room around it, in pixels.
-const PLOT: f64 = 220.0;
-const LEFT: f64 = 84.0;
-const TOP: f64 = 34.0;
+pub(super) const PLOT: f64 = 220.0;
+pub(super) const LEFT: f64 = 84.0;
+pub(super) const TOP: f64 = 34.0;
 /// Width of a bar, of the gap between groups, and of a letter.
 const BAR: f64 = 22.0;
 const GAP: f64 = 26.0;
 const LETTER: f64 = 7.0;
 /// Height of a line of text.
-const LINE: f64 = 18.0;
+pub(super) const LINE: f64 = 18.0;
 /// The narrowest plot: its title needs room.
 const NARROWEST: f64 = 360.0;
 
@@ -44,15 +44,16 @@ pub struct Chart<'a> {
 }
 
 /// The vertical axis: values of its ends, and of the ticks.
-struct Axis {
+pub(super) struct Axis {
     scale: Scale,
     low: f64,
     high: f64,
-    ticks: Vec<f64>,
+    pub ticks: Vec<f64>,
 }
 
 impl Axis {
-    fn new(scale: Scale, values: impl Iterator<Item = f64> + Clone) -> Self {
+    /// That shows all values.
+    pub fn new(scale: Scale, values: impl Iterator<Item = f64> + Clone) -> Self {
         let most = values.clone().fold(0.0, f64::max);
         match scale {
             Scale::Linear => Self::linear(most),
@@ -79,7 +80,7 @@ impl Axis {
     }
 
     /// Height of a value above the lower end, 0 to 1.
-    fn part(&self, value: f64) -> f64 {
+    pub fn part(&self, value: f64) -> f64 {
         let at = match self.scale {
             Scale::Linear => value,
             Scale::Logarithmic if value <= 0.0 => self.low,
@@ -174,11 +175,13 @@ impl Chart<'_> {
     }
 }
 
-fn colour(series: usize) -> &'static str {
+/// The colour of a series.
+pub(super) fn colour(series: usize) -> &'static str {
     COLOURS[series % COLOURS.len()]
 }
 
-fn text(out: &mut String, at: [f64; 2], attributes: &str, words: &str) {
+/// Adds a text.
+pub(super) fn text(out: &mut String, at: [f64; 2], attributes: &str, words: &str) {
     out.push_str(&format!("<text x=\"{:.1}\" y=\"{:.1}\" {attributes}>{}</text>", at[0], at[1], escape(words)));
 }
 

@@ -1,5 +1,7 @@
 //! Study files: variants, scenes, and what the pictures are measured against.
 
+use super::axes::Axes;
+use super::interval::Repeat;
 use crate::configs::{Axis, Library, is_path, scene_names, unknown};
 use crate::error::Error;
 use crate::render::Until;
@@ -27,13 +29,16 @@ pub struct Study {
     #[serde(default)]
     pub doc: String,
     /// How often everything is rendered, each time with another seed.
-    #[serde(default = "once")]
-    pub repeat: u32,
+    #[serde(default)]
+    pub repeat: Repeat,
     /// What holds unless a scene or a variant says otherwise.
     #[serde(default)]
     pub defaults: Defaults,
-    /// What is compared.
-    #[serde(rename = "variant")]
+    /// Lists whose combinations are variants before those of `variants`.
+    #[serde(default)]
+    axes: Axes,
+    /// What is compared; once the file is read, the combinations of its axes too.
+    #[serde(default, rename = "variant")]
     pub variants: Vec<Variant>,
     /// On what.
     #[serde(rename = "scene")]
@@ -103,10 +108,6 @@ pub enum Against {
     Render(Box<Wanted>),
 }
 
-fn once() -> u32 {
-    1
-}
-
 impl Study {
     /// Reads a study by the name of a shipped one or by its file, from whose folder its files count.
     ///
@@ -137,8 +138,20 @@ impl Study {
         let mut study: Self =
             toml::from_str(text).map_err(|error| Error::input(error.to_string().trim_end()).in_file(file))?;
         study.name = Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        study.check().map_err(|error| error.in_file(file))?;
+        study.multiply(text).and_then(|()| study.check()).map_err(|error| error.in_file(file))?;
         Ok(study)
+    }
+
+    /// Puts the combinations of the axes before the variants.
+    fn multiply(&mut self, text: &str) -> Result<(), Error> {
+        let mut variants = self.axes.variants(text)?;
+        variants.append(&mut self.variants);
+        if variants.is_empty() {
+            return Err(Error::input("there is nothing to compare")
+                .help("`[[variant]]` tables, or lists in `[axes]` such as `layout = [\"aos\", \"soa\"]`"));
+        }
+        self.variants = variants;
+        Ok(())
     }
 
     fn relative_to(&mut self, folder: &Path) {
@@ -154,9 +167,6 @@ impl Study {
     }
 
     fn check(&self) -> Result<(), Error> {
-        if self.repeat == 0 {
-            return Err(Error::input("`repeat` must be at least 1"));
-        }
         self.check_names()?;
         check_length(self.defaults.seconds, &self.defaults.settings).map_err(|error| error.at("defaults"))?;
         for variant in &self.variants {
@@ -221,14 +231,14 @@ impl Study {
     ///
     /// # Errors
     /// User input, when an axis names what does not exist.
-    pub fn wanted(&self, variant: &Variant, scene: &StudyScene, repeat: u32) -> Result<Wanted, Error> {
+    pub fn wanted(&self, variant: &Variant, scene: &StudyScene) -> Result<Wanted, Error> {
         let name = RenderFile { scene: Some(scene.name.clone()), ..RenderFile::default() };
         let wanted = Wanted { seconds: None, settings: name.with_defaults() }
             .overlaid(self.defaults.seconds, &self.defaults.settings)
             .overlaid(scene.seconds, &scene.settings)
             .overlaid(variant.seconds, &variant.settings);
         let place = format!("variant `{}`", variant.name);
-        wanted.finished(repeat).map_err(|error| error.at(place))
+        wanted.finished().map_err(|error| error.at(place))
     }
 
     /// What the pictures of a scene are measured against, if anything.
@@ -240,7 +250,7 @@ impl Study {
             return Ok(Some(Against::File(file.clone())));
         }
         let Some(name) = &scene.reference_variant else { return Ok(None) };
-        let mut wanted = self.wanted(self.variant(name)?, scene, 0)?;
+        let mut wanted = self.wanted(self.variant(name)?, scene)?;
         wanted.seconds = None;
         wanted.settings.spp = scene.reference_spp;
         wanted.settings.seed = wanted.settings.seed.map(|seed| seed.wrapping_add(REFERENCE_SEED));
@@ -269,13 +279,13 @@ impl Wanted {
         Self { seconds: seconds.or(kept), settings }
     }
 
-    /// With what depends on files made independent of them, and the seed of a repetition.
-    fn finished(mut self, repeat: u32) -> Result<Self, Error> {
+    /// With what depends on files made independent of them.
+    fn finished(mut self) -> Result<Self, Error> {
         let mut library = Library::default();
         let selection = self.settings.selection(&mut library, Effects::new())?;
         self.settings.pin(&selection, &library);
         self.settings.doc = None;
-        self.settings.seed = Some(self.settings.seed.unwrap_or(0).wrapping_add(repeat));
+        self.settings.seed.get_or_insert(0);
         if !self.settings.wants(Aov::Variance) {
             // z-scores weigh differences against the noise.
             self.settings.aov.push(Aov::Variance);
@@ -284,6 +294,14 @@ impl Wanted {
             self.settings.spp.get_or_insert(DEFAULT_SAMPLES);
         }
         Ok(self)
+    }
+
+    /// The same with the seed of a repetition.
+    #[must_use]
+    pub fn repeated(&self, repeat: u32) -> Self {
+        let mut again = self.clone();
+        again.settings.seed = again.settings.seed.map(|seed| seed.wrapping_add(repeat));
+        again
     }
 
     /// When it is done.
@@ -344,8 +362,8 @@ mod tests {
     #[test]
     fn variants_lie_over_scenes_over_defaults() -> Result<(), Error> {
         let study = study(TEXT)?;
-        let [a, b] = [0, 1].map(|variant| study.wanted(&study.variants[variant], &study.scenes[0], 3));
-        let (a, b) = (a?, b?);
+        let [a, b] = [0, 1].map(|variant| study.wanted(&study.variants[variant], &study.scenes[0]));
+        let (a, b) = (a?, b?.repeated(3));
         assert_eq!((a.seconds, a.settings.spp, a.settings.pipeline.as_deref()), (Some(2.0), None, Some("pt")));
         assert_eq!((b.seconds, b.settings.spp, b.settings.pipeline.as_deref()), (None, Some(8), Some("nee")));
         assert_eq!((b.settings.set.len(), b.settings.set["max_edges"].word()), (2, "6".to_owned()));
@@ -384,9 +402,31 @@ mod tests {
     }
 
     #[test]
+    fn products_come_before_variants() -> Result<(), Error> {
+        let study = study(&TEXT.replace("[defaults]", "[axes]\nlayout = [\"aos\", \"soa\"]\n[defaults]"))?;
+        let names: Vec<&str> = study.variants.iter().map(|variant| variant.name.as_str()).collect();
+        assert_eq!(names, ["aos", "soa", "a", "b"]);
+        Ok(())
+    }
+
+    #[test]
+    fn mistakes_in_products_are_named() {
+        let axes = |text: &str| format!("[axes]\n{text}\n        [defaults]");
+        refused("[defaults]", &axes("layout = [\"sao\"]"), &["a.toml: line 4, axes.layout", "no layout named `sao`"]);
+        refused("[defaults]", &axes("layout = [\"a\"]"), &["no layout named `a`"]);
+        refused("name = \"b\"", "name = \"b\"\nsets = 3", &["unknown field `sets`"]);
+        let nothing = "title = \"t\"\n[[scene]]\nname = \"cornell_box\"\n";
+        let error = study(nothing).expect_err("there is no variant").to_string();
+        assert!(error.contains("nothing to compare") && error.contains("[axes]"), "{error}");
+        let twice = TEXT.replace("[defaults]", &axes("layout = [\"aos\"]")).replace("name = \"a\"", "name = \"aos\"");
+        let error = study(&twice).expect_err("two variants of one name").to_string();
+        assert!(error.contains("two variants"), "{error}");
+    }
+
+    #[test]
     fn an_unknown_axis_names_its_variant() -> Result<(), Error> {
         let study = study(&TEXT.replace("\"nee\"", "\"ne\""))?;
-        let error = study.wanted(&study.variants[1], &study.scenes[0], 0);
+        let error = study.wanted(&study.variants[1], &study.scenes[0]);
         assert!(error.is_err_and(|error| error.to_string().contains("variant `b`") && error.exit_code() == 2));
         Ok(())
     }

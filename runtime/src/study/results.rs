@@ -1,12 +1,16 @@
 //! What a study found: `results.json`, which also tells what need not be rendered again, and `results.csv`.
 
 use super::file::Wanted;
+use crate::compare::bias::Bias;
 use crate::compare::metrics::block_mse;
 use crate::compare::{Image, block_z, check, metrics, zscore};
+use crate::copy_rate::CopyRate;
 use crate::error::Error;
 use crate::image_file::replace;
+use crate::kernel_profile::KernelProfile;
 use crate::measurements::Measurements;
 use crate::settings::SetValue;
+use kernelgen::report::{Reason, Report, TableReport};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +36,12 @@ pub struct Results {
     pub skipped: Vec<Skipped>,
     /// What pictures were measured against.
     pub references: Vec<Reference>,
+    /// The device's copy rate; unknown where it has no timestamps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copy_rate: Option<CopyRate>,
+    /// Where the state of each variant lives, scene by scene.
+    #[serde(default)]
+    pub states: Vec<State>,
     /// One entry a picture.
     pub runs: Vec<Run>,
 }
@@ -43,6 +53,38 @@ pub struct Skipped {
     pub scene: String,
     /// Why.
     pub reason: String,
+}
+
+/// Where the state of a variant lives on a scene.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct State {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the variant.
+    pub variant: String,
+    /// Bytes a path, rays in flight left out where the layout keeps them apart.
+    pub bytes_per_path: u32,
+    /// Bytes of its rays in flight, where the layout keeps them apart.
+    #[serde(default)]
+    pub ray_bytes_per_path: u32,
+    /// Its tables.
+    pub tables: Vec<TableReport>,
+    /// Fields that are stored nowhere, and why.
+    pub dead: Vec<Reason>,
+}
+
+impl State {
+    /// As the generator reports it.
+    pub fn of(scene: &str, variant: &str, report: &Report) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            variant: variant.to_owned(),
+            bytes_per_path: report.bytes_per_path,
+            ray_bytes_per_path: report.ray_bytes_per_path,
+            tables: report.tables.clone(),
+            dead: report.dead.clone(),
+        }
+    }
 }
 
 /// What the pictures of a scene were measured against.
@@ -95,6 +137,26 @@ pub struct Errors {
     pub block_mse: f64,
     /// That times the seconds of rendering: what is left after one second, where the error is noise alone.
     pub block_mse_seconds: f64,
+    /// How far its mean is off; `None` where the reference is black.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bias: Option<Bias>,
+}
+
+impl Run {
+    /// Variance of one sample of a pixel over the squared mean radiance, mean over pixels; unknown before the second batch.
+    pub fn variance(&self) -> Option<f64> {
+        let error = self.measured.relative_error?;
+        Some(error.powi(2) * f64::from(self.measured.samples_per_pixel))
+    }
+
+    /// Seconds after which noise and what is certain of the bias together are this part of the mean radiance; `None` where bias alone
+    /// is more, or noise unknown.
+    pub fn seconds_to(&self, relative: f64) -> Option<f64> {
+        let bias = self.errors.as_ref().and_then(|errors| errors.bias).map_or(0.0, |bias| bias.certain());
+        let room = relative.powi(2) - bias.powi(2);
+        let noise = self.measured.relative_error?.powi(2);
+        (room > 0.0).then(|| self.measured.seconds * noise / room)
+    }
 }
 
 impl Errors {
@@ -114,6 +176,7 @@ impl Errors {
             max_block_z: block_z(image, reference, BLOCK).as_deref().map(zscore::largest),
             block_mse,
             block_mse_seconds: block_mse * seconds,
+            bias: Bias::of(image, reference),
         })
     }
 
@@ -197,6 +260,7 @@ const COLUMNS: &[Column] = &[
     ("samples_per_pixel", |run| run.measured.samples_per_pixel.to_string()),
     ("samples", |run| run.measured.samples.to_string()),
     ("seconds", |run| run.measured.seconds.to_string()),
+    ("ms_per_msample", |run| run.measured.ms_per_msample().to_string()),
     ("ms_per_frame", |run| run.measured.ms_per_frame().to_string()),
     ("msamples_per_s", |run| run.measured.msamples_per_s.to_string()),
     ("rays_primary", |run| run.measured.rays.primary.to_string()),
@@ -208,7 +272,13 @@ const COLUMNS: &[Column] = &[
     ("mrays_per_s_deep", |run| run.measured.mrays_per_s.deep.to_string()),
     ("mrays_per_s_visibility", |run| run.measured.mrays_per_s.visibility.to_string()),
     ("device_ms_per_pass", |run| number(run.measured.ms_per_pass.as_ref().map(|times| times.values().sum()))),
+    ("device_ms_per_msample", |run| kernels(run, KernelProfile::ms_per_msample)),
     ("bytes_per_path", |run| run.measured.bytes_per_path.to_string()),
+    ("ray_bytes_per_path", |run| run.measured.ray_bytes_per_path.to_string()),
+    ("bytes_moved_per_sample", |run| kernels(run, |kernels| Some(kernels.bytes_per_sample()))),
+    ("gb_per_s", |run| kernels(run, KernelProfile::gb_per_s)),
+    ("compile_seconds", |run| kernels(run, |kernels| Some(kernels.compile_seconds))),
+    ("spirv_bytes", |run| kernels(run, |kernels| Some(kernels.spirv_bytes() as f64))),
     ("rejected", |run| run.measured.rejected.to_string()),
     ("mean_r", |run| run.mean[0].to_string()),
     ("mean_g", |run| run.mean[1].to_string()),
@@ -223,6 +293,10 @@ const COLUMNS: &[Column] = &[
     ("max_block_z", |run| error(run, |errors| errors.max_block_z)),
     ("block_mse", |run| error(run, |errors| Some(errors.block_mse))),
     ("block_mse_seconds", |run| error(run, |errors| Some(errors.block_mse_seconds))),
+    ("bias", |run| error(run, |errors| Some(errors.bias?.relative))),
+    ("bias_half_width", |run| error(run, |errors| errors.bias?.half_width)),
+    ("variance", |run| number(run.variance())),
+    ("seconds_to_1_percent", |run| number(run.seconds_to(0.01))),
     ("adapter", |run| run.measured.adapter.clone()),
     ("picture", |run| run.picture.clone()),
 ];
@@ -238,6 +312,10 @@ fn set(run: &Run) -> String {
 
 fn number(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| value.to_string())
+}
+
+fn kernels(run: &Run, value: fn(&KernelProfile) -> Option<f64>) -> String {
+    number(run.measured.kernel_profile.as_ref().and_then(value))
 }
 
 fn error(run: &Run, value: fn(&Errors) -> Option<f64>) -> String {

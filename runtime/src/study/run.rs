@@ -3,16 +3,18 @@
 
 use super::file::{Against, Study, StudyScene, Variant, Wanted, file_name};
 use super::report;
-use super::results::{Errors, Reference, Results, Run, Skipped, difference_path, write_text};
+use super::results::{Errors, Reference, Results, Run, Skipped, State, difference_path, write_text};
 use crate::compare::metrics::difference_picture;
 use crate::configs::Library;
+use crate::copy_rate::CopyRate;
 use crate::device::Gpu;
 use crate::error::Error;
 use crate::image_file::Image;
+use crate::kernel_profile::KernelProfile;
 use crate::measurements::Measurements;
 use crate::output::{make_folder, save};
 use crate::picture::{Exposure, write_png};
-use crate::render::{Progress, Rendered, Session, Settings, Until};
+use crate::render::{Progress, Session, Settings, Until};
 use crate::scene::{Accelerator, Scene};
 use crate::settings::RenderFile;
 use kernelgen::Generated;
@@ -54,6 +56,7 @@ pub struct Outcome {
 pub fn run(study: &Study, folder: &Path, gpu: &Gpu, observer: &mut dyn Observer) -> Result<Outcome, Error> {
     let mut runner = Runner::new(study, folder, gpu, observer)?;
     make_folder(folder)?;
+    runner.measure_device()?;
     // What is going to be rendered anew must not pass for done when its picture is there and its numbers are not.
     runner.results().write(folder)?;
     for scene in study.scenes.iter().filter(|scene| scene.absence(&study.defaults).is_none()) {
@@ -75,6 +78,14 @@ struct Task<'a> {
     done: Option<Run>,
 }
 
+/// What is kept of a render besides its files.
+struct Finished {
+    generated: Generated,
+    measured: Measurements,
+    /// Mean radiance by channel, W m^-2 sr^-1.
+    mean: [f64; 3],
+}
+
 /// The scene in memory, and the settings that it was loaded with.
 struct Loaded {
     settings: RenderFile,
@@ -89,6 +100,8 @@ struct Runner<'a> {
     tasks: Vec<Task<'a>>,
     skipped: Vec<Skipped>,
     references: Vec<Reference>,
+    copy_rate: Option<CopyRate>,
+    states: Vec<State>,
     loaded: Option<Loaded>,
     rendered: usize,
     stopped: bool,
@@ -110,7 +123,28 @@ impl<'a> Runner<'a> {
         }
         let in_study = |reference: &Reference| study.scenes.iter().any(|scene| scene.name == reference.scene);
         let references = earlier.references.into_iter().filter(in_study).collect();
-        Ok(Self { study, folder, gpu, observer, tasks, skipped, references, loaded: None, rendered: 0, stopped: false })
+        Ok(Self {
+            study,
+            folder,
+            gpu,
+            observer,
+            tasks,
+            skipped,
+            references,
+            copy_rate: earlier.copy_rate,
+            states: earlier.states,
+            loaded: None,
+            rendered: 0,
+            stopped: false,
+        })
+    }
+
+    /// Measures the copy rate, unless an earlier call did on the same device.
+    fn measure_device(&mut self) -> Result<(), Error> {
+        if self.copy_rate.as_ref().is_none_or(|rate| rate.adapter != self.gpu.info.name) {
+            self.copy_rate = CopyRate::measure(self.gpu)?;
+        }
+        Ok(())
     }
 
     /// Renders what is left of a scene, and measures it.
@@ -124,6 +158,9 @@ impl<'a> Runner<'a> {
                 return Ok(());
             }
             if self.tasks[task].done.is_none() {
+                if !self.is_wanted(task) {
+                    continue;
+                }
                 self.run_task(task)?;
             }
             if let Some(reference) = &reference {
@@ -132,6 +169,14 @@ impl<'a> Runner<'a> {
             self.results().write(self.folder)?;
         }
         Ok(())
+    }
+
+    /// Whether the repetitions before this one leave the time of its variant too uncertain.
+    fn is_wanted(&self, task: usize) -> bool {
+        let Task { scene, variant, .. } = &self.tasks[task];
+        let of_both = |run: &&Run| run.scene == scene.name && run.variant == variant.name;
+        let runs = self.tasks.iter().filter_map(|task| task.done.as_ref()).filter(of_both);
+        self.study.repeat.wants_more(&runs.map(|run| run.measured.ms_per_frame()).collect::<Vec<_>>())
     }
 
     /// Generates all that will be rendered: better refused now than after the first pictures.
@@ -230,14 +275,18 @@ impl<'a> Runner<'a> {
         let title = self.tasks[task].title();
         let wanted = self.tasks[task].wanted.clone();
         let path = self.folder.join(&self.tasks[task].picture);
-        if let Some((rendered, measured)) = self.render(&wanted, &title, &path)? {
-            self.tasks[task].finish(&rendered, measured);
+        if let Some(finished) = self.render(&wanted, &title, &path)? {
+            let Task { scene, variant, .. } = &self.tasks[task];
+            let state = State::of(&scene.name, &variant.name, &finished.generated.report);
+            self.states.retain(|known| known.scene != state.scene || known.variant != state.variant);
+            self.states.push(state);
+            self.tasks[task].finish(finished);
         }
         Ok(())
     }
 
     /// Renders and writes a picture; `None` when it was stopped.
-    fn render(&mut self, wanted: &Wanted, title: &str, path: &Path) -> Result<Option<(Rendered, Measurements)>, Error> {
+    fn render(&mut self, wanted: &Wanted, title: &str, path: &Path) -> Result<Option<Finished>, Error> {
         if !self.observer.begin(title) {
             self.stopped = true;
             return Ok(None);
@@ -247,19 +296,14 @@ impl<'a> Runner<'a> {
         result
     }
 
-    fn render_loaded(&mut self, wanted: &Wanted, path: &Path) -> Result<Option<(Rendered, Measurements)>, Error> {
+    fn render_loaded(&mut self, wanted: &Wanted, path: &Path) -> Result<Option<Finished>, Error> {
         let mut loaded = self.load(&wanted.settings)?;
         let result = self.render_scene(&mut loaded.scene, wanted, path);
         self.loaded = Some(loaded);
         result
     }
 
-    fn render_scene(
-        &mut self,
-        scene: &mut Scene,
-        wanted: &Wanted,
-        path: &Path,
-    ) -> Result<Option<(Rendered, Measurements)>, Error> {
+    fn render_scene(&mut self, scene: &mut Scene, wanted: &Wanted, path: &Path) -> Result<Option<Finished>, Error> {
         let gpu = self.gpu;
         let generated = generate(&wanted.settings, scene.effects.clone())?;
         scene.set_accelerator(Accelerator::of(&generated.plan))?;
@@ -267,6 +311,7 @@ impl<'a> Runner<'a> {
         let (until, render) = (wanted.until(), render_settings(&settings));
         let scene = &*scene;
         let mut session = Session::new(gpu, &generated.plan, &|name| scene.resource(name), render, work(until))?;
+        session.warm_up(until)?;
         let mut go_on = true;
         session.run(until, &mut |progress| {
             go_on &= self.observer.show(progress);
@@ -280,8 +325,9 @@ impl<'a> Runner<'a> {
         let metadata = settings.of_rendered(&rendered, until);
         save(path, &rendered, &metadata, Exposure::Percentile)?;
         self.rendered += 1;
-        let measured = Measurements::of(&rendered, &generated, gpu, &metadata);
-        Ok(Some((rendered, measured)))
+        let mut measured = Measurements::of(&rendered, &generated, gpu, &metadata);
+        measured.kernel_profile = Some(KernelProfile::of(&generated.plan, &rendered, &session.occupancy()?)?);
+        Ok(Some(Finished { mean: mean(&rendered.mean), measured, generated }))
     }
 
     /// Measures a picture against the reference, unless that has been done.
@@ -304,8 +350,20 @@ impl<'a> Runner<'a> {
             scenes: scenes.filter(|name| !skipped(name)).cloned().collect(),
             skipped: self.skipped.clone(),
             references: self.references.clone(),
+            copy_rate: self.copy_rate.clone(),
+            states: self.states(),
             runs: self.tasks.iter().filter_map(|task| task.done.clone()).collect(),
         }
+    }
+
+    /// In the order of scenes and variants, whatever was rendered first.
+    fn states(&self) -> Vec<State> {
+        let first = self.tasks.iter().filter(|task| task.repeat == 0);
+        let of = |task: &Task| {
+            let is = |state: &&State| state.scene == task.scene.name && state.variant == task.variant.name;
+            self.states.iter().find(is).cloned()
+        };
+        first.filter_map(of).collect()
     }
 
     fn finish(self) -> Result<Outcome, Error> {
@@ -322,15 +380,15 @@ impl Task<'_> {
         format!("variant `{}`, scene `{}`{turn}", self.variant.name, self.scene.name)
     }
 
-    fn finish(&mut self, rendered: &Rendered, measured: Measurements) {
+    fn finish(&mut self, finished: Finished) {
         self.done = Some(Run {
             scene: self.scene.name.clone(),
             variant: self.variant.name.clone(),
             repeat: self.repeat,
             picture: self.picture.clone(),
             wanted: self.wanted.clone(),
-            measured,
-            mean: mean(&rendered.mean),
+            measured: finished.measured,
+            mean: finished.mean,
             errors: None,
         });
     }
@@ -343,11 +401,12 @@ fn tasks_of<'a>(
     folder: &Path,
     earlier: &Results,
 ) -> Result<Vec<Task<'a>>, Error> {
+    let wanted = |variant| study.wanted(variant, scene).map_err(|error| error.at(format!("scene `{}`", scene.name)));
+    let wanted = study.variants.iter().map(wanted).collect::<Result<Vec<_>, Error>>()?;
     let mut tasks = Vec::new();
-    for repeat in 0..study.repeat {
-        for variant in &study.variants {
-            let wanted =
-                study.wanted(variant, scene, repeat).map_err(|error| error.at(format!("scene `{}`", scene.name)))?;
+    for repeat in 0..study.repeat.at_most {
+        for (variant, wanted) in study.variants.iter().zip(&wanted) {
+            let wanted = wanted.repeated(repeat);
             let picture = picture_name(&scene.name, &variant.name, repeat);
             let same = |run: &&Run| run.wanted == wanted && run.picture == picture;
             let done = earlier.runs.iter().find(same).filter(|run| folder.join(&run.picture).is_file()).cloned();
@@ -378,7 +437,8 @@ fn scene_settings(settings: &RenderFile) -> RenderFile {
     }
 }
 
-fn render_settings(settings: &RenderFile) -> Settings {
+/// What a session is told.
+pub(super) fn render_settings(settings: &RenderFile) -> Settings {
     Settings { size: settings.size.unwrap_or_default(), seed: settings.seed.unwrap_or(0), paths: None }
 }
 
@@ -389,7 +449,11 @@ fn work(until: Until) -> Option<u32> {
     }
 }
 
-fn generate(settings: &RenderFile, effects: Effects) -> Result<Generated, Error> {
+/// Generates a variant.
+///
+/// # Errors
+/// User input, when a name is unknown or the generator refuses the variant.
+pub(super) fn generate(settings: &RenderFile, effects: Effects) -> Result<Generated, Error> {
     let mut library = Library::default();
     let selection = settings.selection(&mut library, effects)?;
     let generated = kernelgen::generate(&library.sources, &selection)

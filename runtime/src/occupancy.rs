@@ -1,0 +1,76 @@
+//! How full queues are: the paths that each kernel takes, round by round.
+
+use crate::program::{Command, Entries};
+
+/// What kernels took in passes that ran for this alone.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Occupancy {
+    /// Path slots in use, all passes together.
+    pub slots: u64,
+    /// Passes.
+    pub passes: u32,
+    /// By kernel of the plan, by round: paths, or records of a stream, that it took. Ends with the last round that has any; what runs
+    /// behind the rounds follows the last of them. Empty for housekeeping.
+    pub entries: Vec<Vec<u64>>,
+}
+
+impl Occupancy {
+    /// Nothing counted yet, for a plan of so many kernels.
+    pub fn new(kernels: usize) -> Self {
+        Self { entries: vec![Vec::new(); kernels], ..Self::default() }
+    }
+
+    /// Adds a pass of `active` slots: what the control buffer said before each dispatch that is sized by it.
+    pub fn add(&mut self, program: &[Command], counted: &[u32], active: u32) {
+        for (command, &counted) in program.iter().zip(counted) {
+            let taken = match command.entries {
+                Entries::None => 0,
+                Entries::Active => active,
+                Entries::Counted(_) => counted,
+            };
+            if taken > 0 {
+                let rounds = &mut self.entries[command.kernel];
+                let round = command.round as usize;
+                rounds.resize(rounds.len().max(round + 1), 0);
+                rounds[round] += u64::from(taken);
+            }
+        }
+        self.slots += u64::from(active);
+        self.passes += 1;
+    }
+
+    /// Entries of a kernel in all rounds, for one slot in use.
+    pub fn per_slot(&self, kernel: usize) -> f64 {
+        self.entries[kernel].iter().sum::<u64>() as f64 / self.slots.max(1) as f64
+    }
+
+    /// Entries of a kernel by round, for one slot in use.
+    pub fn by_round(&self, kernel: usize) -> Vec<f64> {
+        self.entries[kernel].iter().map(|&entries| entries as f64 / self.slots.max(1) as f64).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::program::Extent;
+
+    #[test]
+    fn entries_are_added_by_kernel_and_round() {
+        let command = |kernel, round, entries| Command { kernel, round, extent: Extent::Active, entries };
+        let program = [
+            command(0, 0, Entries::None),
+            command(1, 0, Entries::Active),
+            command(2, 0, Entries::Counted(36)),
+            command(2, 1, Entries::Counted(36)),
+            command(2, 2, Entries::Counted(36)),
+        ];
+        let mut occupancy = Occupancy::new(3);
+        occupancy.add(&program, &[0, 0, 8, 4, 0], 8);
+        occupancy.add(&program, &[0, 0, 2, 0, 0], 2);
+        assert_eq!((occupancy.slots, occupancy.passes), (10, 2));
+        assert_eq!(occupancy.entries, [vec![], vec![10], vec![10, 4]]);
+        assert_eq!(occupancy.per_slot(2), 1.4);
+        assert_eq!(occupancy.by_round(2), [1.0, 0.4]);
+    }
+}
