@@ -52,6 +52,7 @@ pub struct Job {
     size: [u32; 2],
     samples: u32,
     seed: u32,
+    paths: Option<u32>,
 }
 
 /// A rendered image and what was counted.
@@ -84,6 +85,7 @@ impl Job {
             size: [32, 32],
             samples: 64,
             seed: 1,
+            paths: None,
         }
     }
 
@@ -161,6 +163,12 @@ impl Job {
         self
     }
 
+    /// Path slots.
+    pub fn paths(mut self, paths: u32) -> Job {
+        self.paths = Some(paths);
+        self
+    }
+
     /// `--set KEY=VALUE`.
     pub fn set(mut self, key: &str, value: impl ToString) -> Job {
         self.settings.set.insert(key.into(), SetValue::Text(value.to_string()));
@@ -186,7 +194,7 @@ impl Job {
             scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
         }
         let gpu = device();
-        let settings = Settings { size: self.size, seed: self.seed, paths: None };
+        let settings = Settings { size: self.size, seed: self.seed, paths: self.paths };
         let resources = |name: &str| scene.resource(name);
         let mut session =
             Session::new(&gpu, &plan, &resources, settings, Some(self.samples)).expect("the plan fits the device");
