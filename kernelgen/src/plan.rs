@@ -9,8 +9,8 @@ pub const SLOT_GRAIN: u32 = 1024;
 
 /// Buffers, kernels and the program of one pass.
 ///
-/// A pass takes `active` path slots (at most `slots_per_grain` of every `SLOT_GRAIN` that there are) through the program once. The runtime writes the `pass_info` uniform
-/// (see `Role::Pass`) before it.
+/// A pass takes `active` path slots (at most `slots_per_grain` of every `SLOT_GRAIN` that there are) through the program once, with as
+/// many paths, or up to `paths_per_slot` times as many. The runtime writes the `pass_info` uniform (see `Role::Pass`) before it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Plan {
     /// What the runtime allocates or provides; kernels name them by index.
@@ -37,6 +37,9 @@ pub struct Plan {
     pub ray_bytes_per_path: u32,
     /// Slots that a pass may use of every `SLOT_GRAIN`: all, unless a stream has less room than all could fill in one round.
     pub slots_per_grain: u32,
+    /// Paths that a pass may have for each slot that it uses: where it has more paths than slots, a slot whose path is over takes the
+    /// next.
+    pub paths_per_slot: u32,
     /// Whether kernels use subgroup operations, f16, f64, 64-bit atomics or float atomics: features to ask of the adapter.
     pub needs: Needs,
 }
@@ -137,8 +140,8 @@ pub enum Role {
     TallyCounts,
     /// Counts of earlier samples for each path, an f32 an index of a tally; written by the runtime.
     TallyRates,
-    /// Uniform, 32 bytes, written by the runtime before each pass: u32 first_pixel, first_sample, active, width, height, seed, 0, 0.
-    /// Slot i works on linear = first_pixel + i; sample = first_sample + linear / (width*height); pixel = tile order of linear % (width*height).
+    /// Uniform, 32 bytes, written by the runtime before each pass: u32 first_pixel, first_sample, active, width, height, seed, paths, 0.
+    /// Path i of the pass, which slot i takes if there are so many, works on linear = first_pixel + i; sample = first_sample + linear / (width*height); pixel = tile order of linear % (width*height).
     Pass,
     /// A scene resource that the runtime provides under this name.
     Resource,

@@ -35,8 +35,10 @@ pub struct Pass {
     pub height: u32,
     /// Seed of the random numbers.
     pub seed: u32,
+    /// Paths, more than slots where these take several.
+    pub paths: u32,
     /// Padding.
-    pub unused: [u32; 2],
+    pub unused: u32,
 }
 
 #[derive(Debug)]

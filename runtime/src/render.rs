@@ -114,7 +114,10 @@ pub struct Session {
     /// Whether the pilot is still to come.
     unpiloted: bool,
     settings: Settings,
+    /// Path slots that a pass may use.
     slots: u32,
+    /// Paths that a pass may have.
+    most_paths: u32,
     pass_limit: u32,
     samples: u32,
     batches: u32,
@@ -164,7 +167,8 @@ impl Session {
             tallies,
             settings,
             slots,
-            pass_limit: slots,
+            most_paths: slots * plan.paths_per_slot,
+            pass_limit: slots * plan.paths_per_slot,
             samples: 0,
             batches: 0,
             spread_known: true,
@@ -254,7 +258,7 @@ impl Session {
 
     /// Runs a pass with the pilot's seed.
     fn discarded(&mut self, done: u32, active: u32) -> Result<(), Error> {
-        let pass = pass_at(&self.settings, self.settings.seed ^ PILOT_SEED, 0, done.into(), active);
+        let pass = pass_at(&self.settings, self.settings.seed ^ PILOT_SEED, 0, done.into(), [self.slots, active]);
         self.executor.submit(pass, false, |_| ())?;
         self.executor.wait().map(drop)
     }
@@ -335,7 +339,7 @@ impl Session {
     /// A pass of whole samples at most, and an eighth of the work at most.
     fn wanted_samples(&self, until: Until) -> u32 {
         let pixels = self.settings.size[0] * self.settings.size[1];
-        let natural = (self.slots / pixels).max(1);
+        let natural = (self.most_paths / pixels).max(1);
         match until {
             Until::Samples(wanted) => {
                 let run = wanted - self.samples_before.min(wanted);
@@ -369,7 +373,7 @@ impl Session {
 
     /// Submits the pass that begins `done` slots into the current batch, and ends the batch behind it if `ends` says of how many samples.
     fn submit(&mut self, done: u64, active: u32, ends: Option<u32>) -> Result<(), Error> {
-        let pass = pass_at(&self.settings, self.settings.seed, self.samples, done, active);
+        let pass = pass_at(&self.settings, self.settings.seed, self.samples, done, [self.slots, active]);
         let number = self.passes;
         let measure = number <= MEASURED_FIRST || number.is_multiple_of(MEASURED_EVERY);
         let (gpu, accumulator, samples) = (&self.gpu, &self.accumulator, self.samples);
@@ -404,10 +408,10 @@ impl Session {
     fn pace(&mut self, active: u32, seconds: f64) {
         let fitting = f64::from(active) * PASS_SECONDS / seconds.max(1e-6);
         let slow = seconds > PASS_SECONDS;
-        let quick = seconds < PASS_SECONDS / 4.0 && active >= self.pass_limit && self.pass_limit < self.slots;
+        let quick = seconds < PASS_SECONDS / 4.0 && active >= self.pass_limit && self.pass_limit < self.most_paths;
         if slow || quick {
             let wanted = fitting.min(2.0 * f64::from(self.pass_limit)) as u32;
-            self.pass_limit = (wanted / 1024 * 1024).max(SMALLEST_PASS).min(self.slots);
+            self.pass_limit = (wanted / 1024 * 1024).max(SMALLEST_PASS).min(self.most_paths);
         }
     }
 
@@ -485,7 +489,7 @@ impl Session {
         for index in 0..counted {
             let done = index * passes / counted * u64::from(self.pass_limit);
             let active = u64::from(self.pass_limit).min(work - done) as u32;
-            let pass = pass_at(&self.settings, self.settings.seed, 0, done, active);
+            let pass = pass_at(&self.settings, self.settings.seed, 0, done, [self.slots, active]);
             self.executor.count_entries(pass, &mut occupancy)?;
         }
         Ok(occupancy)
@@ -509,17 +513,19 @@ pub fn render(
 }
 
 /// The pass of `active` slots that begins `done` slots behind the start of sample `sample`.
-fn pass_at(settings: &Settings, seed: u32, sample: u32, done: u64, active: u32) -> Pass {
+/// A pass of so many slots at most, and so many paths.
+fn pass_at(settings: &Settings, seed: u32, sample: u32, done: u64, [slots, paths]: [u32; 2]) -> Pass {
     let [width, height] = settings.size;
     let pixels = u64::from(width) * u64::from(height);
     Pass {
         first_pixel: (done % pixels) as u32,
         first_sample: sample + (done / pixels) as u32,
-        active,
+        active: slots.min(paths),
         width,
         height,
         seed,
-        unused: [0; 2],
+        paths,
+        unused: 0,
     }
 }
 

@@ -55,6 +55,7 @@ pub struct Job {
     samples: u32,
     seed: u32,
     poisoned: bool,
+    paths: Option<u32>,
 }
 
 /// A rendered image and what was counted.
@@ -88,6 +89,7 @@ impl Job {
             samples: 64,
             seed: 1,
             poisoned: false,
+            paths: None,
         }
     }
 
@@ -171,6 +173,12 @@ impl Job {
         self
     }
 
+    /// Path slots.
+    pub fn paths(mut self, paths: u32) -> Job {
+        self.paths = Some(paths);
+        self
+    }
+
     /// `--set KEY=VALUE`.
     pub fn set(mut self, key: &str, value: impl ToString) -> Job {
         self.settings.set.insert(key.into(), SetValue::Text(value.to_string()));
@@ -199,7 +207,7 @@ impl Job {
             scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");
         }
         let gpu = device();
-        let settings = Settings { size: self.size, seed: self.seed, paths: None };
+        let settings = Settings { size: self.size, seed: self.seed, paths: self.paths };
         let resources = |name: &str| scene.resource(name);
         let mut session =
             Session::new(&gpu, &plan, &resources, settings, Some(self.samples)).expect("the plan fits the device");

@@ -181,7 +181,9 @@ pub struct Stage {
     pub rays: Option<RayKind>,
 }
 
-/// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced.
+/// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced. Where a kernel
+/// goes round inside, a turn counts as a round from that on in which it took the path: of a megakernel the kinds are those of single
+/// stages, of several kernels in a row only the sum is. Where slots take several paths, rounds are those of the pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RayKind {
@@ -310,6 +312,8 @@ pub struct Schedule {
     pub workgroup: Spanned<u32>,
     /// How the film adds.
     pub accumulate: Accumulate,
+    /// Paths of a pass for each slot: with more than one, a slot whose path is over takes the next.
+    pub regenerate: Spanned<u32>,
     /// Streams resolved by a kernel of their own; the others inline.
     pub batch: Vec<Spanned<String>>,
     /// Records that each batched stream has room for, per path slot.

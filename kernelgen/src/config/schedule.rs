@@ -8,12 +8,16 @@ use crate::diagnostic::Diagnostic;
 use crate::source::Spanned;
 
 /// Keys of `[schedule]`.
-pub const KEYS: [&str; 9] = ["fuse", "queue", "order", "workgroup", "load", "until", "accumulate", "batch", "capacity"];
+pub const KEYS: [&str; 10] =
+    ["fuse", "queue", "order", "workgroup", "load", "until", "regenerate", "accumulate", "batch", "capacity"];
 /// Keys of `[precision]`.
 pub const PRECISION_KEYS: [&str; 1] = ["real"];
 
 /// More room than the longest pass could use; whatever the number of slots, 32 bits count so many records.
 const MOST_CAPACITY: f64 = 1000.0;
+
+/// Paths that a slot takes in a pass at most: 32-bit counters of rays must survive it.
+const MOST_REGENERATED: u32 = 16;
 
 const WORKGROUPS: [u32; 6] = [32, 64, 128, 256, 512, 1024];
 
@@ -31,6 +35,13 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
     let order = section.get("order").and_then(|item| item.word(&["arrival", "slot"], findings));
+    let regenerate = match section.get("regenerate") {
+        Some(item) => {
+            let value = item.integer(1..=MOST_REGENERATED, findings);
+            value.map(|value| Spanned { value, span: item.span() })
+        }
+        None => Some(Spanned { value: 1, span: section.span }),
+    };
     let batch = section.get("batch").and_then(|item| names(&item, findings));
     let capacity = section.require("capacity", "records per path slot in a batched stream: `capacity = 4`", findings);
     let capacity = capacity.and_then(|item| room(&item, findings));
@@ -41,6 +52,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup, QueueKind::None][queue?],
         order: [PathOrder::Arrival, PathOrder::Slot][order.unwrap_or_default()],
         workgroup: workgroup?,
+        regenerate: regenerate?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
         batch: batch.unwrap_or_default(),
         capacity: capacity?,

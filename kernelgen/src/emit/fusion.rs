@@ -5,7 +5,7 @@
 //! with a queue of its own: where a path begins is known from the queue that it waited in. Ways inside a group need no queue.
 
 use super::wiring::WiredStage;
-use crate::config::model::{Fuse, RayKind};
+use crate::config::model::{Fuse, RayKind, Schedule};
 use indexmap::{IndexMap, IndexSet};
 use std::collections::BTreeSet;
 
@@ -27,6 +27,10 @@ pub(super) struct Chain {
     pub stages: IndexSet<String>,
     /// Stages of other groups that it leads to.
     pub exits: IndexSet<String>,
+    /// Stages whose queues it fills: the exits, and the start where slots take new paths.
+    pub feeds: IndexSet<String>,
+    /// Whether a path may be over in it.
+    pub ends: bool,
     /// Whether a way inside leads back: to an earlier stage of the order.
     pub loops: bool,
 }
@@ -40,26 +44,33 @@ impl Chain {
 
 impl Fusion {
     /// Divides these stages, all that the start reaches.
-    pub(super) fn new(stages: &IndexMap<String, WiredStage>, start: &str, fuse: &Fuse) -> Fusion {
-        let groups = Groups::new(stages, fuse);
-        let chain = |entry: &str| groups.chain(stages, start, entry);
+    pub(super) fn new(stages: &IndexMap<String, WiredStage>, start: &str, schedule: &Schedule) -> Fusion {
+        let groups = Groups::new(stages, &schedule.fuse.value);
+        let regenerates = schedule.regenerate.value > 1;
+        let chain = |entry: &str| {
+            let mut chain = groups.chain(stages, start, entry);
+            if regenerates && chain.ends {
+                chain.feeds.insert(start.to_owned());
+            }
+            chain
+        };
         let fed = |name: &str| {
             let leads = |(from, stage): (&String, &WiredStage)| !groups.together(from, name) && stage.leads_to(name);
             stages.iter().any(leads)
         };
-        let queued = stages.keys().filter(|name| fed(name));
+        let queued = stages.keys().filter(|name| fed(name) || (regenerates && *name == start));
         Fusion { start: chain(start), queued: queued.map(|name| (name.clone(), chain(name))).collect() }
     }
 
     /// How many kernels of the loop lead to this one.
     pub(super) fn feeders(&self, entry: &str) -> usize {
-        self.queued.values().filter(|chain| chain.exits.contains(entry)).count()
+        self.queued.values().filter(|chain| chain.feeds.contains(entry)).count()
     }
 
     /// Whether a path may need another round: a kernel of the loop leads to one that the round has run by then.
     pub(super) fn is_repeated(&self) -> bool {
         let place = |entry: &str| self.queued.get_index_of(entry);
-        let back = |chain: &Chain| chain.exits.iter().any(|exit| place(exit) <= place(&chain.entry));
+        let back = |chain: &Chain| chain.feeds.iter().any(|fed| place(fed) <= place(&chain.entry));
         self.queued.values().any(back)
     }
 
@@ -131,7 +142,9 @@ impl Groups {
         Chain {
             entry: entry.to_owned(),
             loops: reached.iter().enumerate().any(back),
+            ends: reached.iter().any(|name| stages.get(*name).is_some_and(WiredStage::may_end)),
             stages: reached.iter().map(|name| (*name).to_owned()).collect(),
+            feeds: exits.clone(),
             exits,
         }
     }

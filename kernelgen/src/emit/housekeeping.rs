@@ -8,22 +8,21 @@ use indexmap::IndexMap;
 use std::fmt::Write;
 
 /// The kernel that zeroes the control buffer. Rays of a start stage with a kernel of its own, which takes every
-/// slot, are counted here.
-pub(super) fn begin_kernel(start_rays: Option<RayKind>) -> String {
+/// slot, are counted here, and the paths that slots take first.
+pub(super) fn begin_kernel(start_rays: Option<RayKind>, regenerates: bool) -> String {
     let mut imports = Imports::default();
     imports.add("control", ["control", "CONTROL_WORDS"]);
-    let first = match start_rays {
-        None => "0u".to_owned(),
-        Some(kind) => {
-            let word = match kind {
-                RayKind::Walk => "CONTROL_RAYS_PRIMARY",
-                RayKind::Visibility => "CONTROL_RAYS_VISIBILITY",
-            };
-            imports.add("control", [word]);
-            imports.add("pass", ["pass_info"]);
-            format!("select(0u, pass_info.slots, word == {word})")
-        }
-    };
+    let rays = start_rays.map(|kind| match kind {
+        RayKind::Walk => "CONTROL_RAYS_PRIMARY",
+        RayKind::Visibility => "CONTROL_RAYS_VISIBILITY",
+    });
+    let words: Vec<&str> = rays.into_iter().chain(regenerates.then_some("CONTROL_TAKEN")).collect();
+    let mut first = "0u".to_owned();
+    if !words.is_empty() {
+        imports.add("control", words.iter().copied());
+        imports.add("pass", ["pass_info"]);
+        first = format!("select(0u, pass_info.slots, word == {})", words.join(" || word == "));
+    }
     format!(
         "{imports}\n\
          /// Clears the counters of the pass before.\n\

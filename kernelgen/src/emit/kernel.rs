@@ -27,6 +27,8 @@ pub(super) struct Frame<'a> {
     pub source: Source,
     pub queues: &'a Queues,
     pub access: &'a Access,
+    /// The start stage, where a slot whose path is over in this kernel takes the next.
+    pub next: Option<&'a str>,
 }
 
 /// What a frame is filled with.
@@ -73,7 +75,7 @@ pub(super) fn stage_kernel(frame: Frame<'_>, stage: &WiredStage) -> String {
 impl Frame<'_> {
     /// The whole text.
     pub(super) fn fill(self, filling: Filling) -> String {
-        let Frame { kernel, queues, access, .. } = self;
+        let Frame { kernel, queues, access, next, .. } = self;
         let Filling { mut imports, heading, locals, instances, body, targets, end, counts } = filling;
         let workgroup = queues.workgroup;
         let (condition, path) = self.path(&mut imports);
@@ -83,11 +85,22 @@ impl Frame<'_> {
         for (codec, function) in &access.codecs {
             imports.add(&format!("codec::{codec}"), [function.as_str()]);
         }
-        let enqueue = enqueue(&targets, queues, &mut imports);
+        let mut enqueue = enqueue(&targets, queues, &mut imports);
+        let (mut test, mut condition) = (String::new(), condition);
+        if let Some(start) = next {
+            test = format!("    let begun = {condition};\n");
+            condition = "begun".to_owned();
+            enqueue.push_str(&take_next(start, &targets, queues, &mut imports));
+        }
         let loaded = loaded(&instances, access, &mut imports);
         let mut stored = String::new();
         for (number, store) in access.stores.iter().enumerate() {
             let _ = writeln!(stored, "{}        {store}", if number == 0 { "\n" } else { "" });
+        }
+        let mut numbered = "";
+        if queues.regenerates && self.source == Source::Slots {
+            imports.add("pass", ["path_numbers"]);
+            numbered = "        path_numbers[index] = index;\n";
         }
         let counted = add_tallies(counts, &mut imports);
         format!(
@@ -96,10 +109,10 @@ impl Frame<'_> {
              @compute @workgroup_size({workgroup})\n\
              fn {kernel}_main{PARAMETERS} {{\n    \
                  let index = (group.y * groups.x + group.x) * {workgroup}u + lane;\n\
-             {locals}    \
+             {test}{locals}    \
                  if {condition} {{\n        \
                      path_id = {path};\n\
-             {loaded}\n{body}{stored}    \
+             {numbered}{loaded}\n{body}{stored}    \
                  }}\n\
              {enqueue}{end}{counted}}}\n",
             access.load_bytes, access.store_bytes
@@ -195,6 +208,15 @@ fn enqueue(targets: &[(String, String)], queues: &Queues, imports: &mut Imports)
     text
 }
 
+/// The lines that let a slot whose path goes nowhere wait for the start with the next path.
+fn take_next(start: &str, targets: &[(String, String)], queues: &Queues, imports: &mut Imports) -> String {
+    imports.add("queue", ["take_next_path"]);
+    let goes_on: Vec<&str> = targets.iter().map(|(_, wanted)| wanted.as_str()).collect();
+    let over = if goes_on.is_empty() { "begun".to_owned() } else { format!("begun && !({})", goes_on.join(" || ")) };
+    let again = enqueue(&[(start.to_owned(), "again".to_owned())], queues, imports);
+    format!("\n    let again = take_next_path({over}, path_id, lane);{again}")
+}
+
 /// The kernel of a batched stream's consumer.
 pub(super) fn consumer_kernel(kernel: &str, name: &str, stream: &WiredStream, workgroup: u32) -> String {
     let mut imports = Imports::default();
@@ -235,6 +257,8 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "group",
         "groups",
         "lane",
+        "begun",
+        "again",
         "next",
         "round",
         "rays",

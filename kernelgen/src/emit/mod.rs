@@ -56,7 +56,9 @@ pub struct Parts {
 pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, Vec<Diagnostic>> {
     let (variant, mut warnings) = config::load(sources, selection)?;
     check_names(&variant)?;
-    let rounds = evaluate_rounds(&variant.pipeline).map_err(|finding| vec![finding])?;
+    let path_rounds = evaluate_rounds(&variant.pipeline).map_err(|finding| vec![finding])?;
+    let paths_per_slot = room::paths_per_slot(&variant.schedule, path_rounds);
+    let rounds = paths_per_slot * path_rounds;
     let tallies = tally::tallies(&variant.pipeline).map_err(|finding| vec![finding])?;
     let layers = film::layers(&variant.pipeline, &tallies).map_err(|finding| vec![finding])?;
     let constants = modules::constants(&variant.pipeline, &variant.effects);
@@ -83,6 +85,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
         queues: &queues,
         constants: &constants,
         rounds,
+        paths_per_slot,
         tallies: &tallies,
         layers: &layers,
     };
@@ -133,7 +136,7 @@ fn add_config_modules(
         ("outcome", modules::outcome(&outcomes)),
         ("features", modules::features(&variant.effects)),
         ("params", modules::params(&pipeline.params)),
-        ("pass", modules::PASS.to_owned()),
+        ("pass", modules::pass(variant.schedule.regenerate.value > 1)),
         ("control", queue::control_module(&queues, 0)),
         ("film", film::module(variant.schedule.accumulate, layers)),
         ("streams", stream::analysis_module(pipeline)),
@@ -193,6 +196,7 @@ fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
         stages,
         streams: batched.map(|(name, _)| name.clone()).collect(),
         kind,
+        regenerates: variant.schedule.regenerate.value > 1,
         workgroup: variant.schedule.workgroup.value,
     }
 }

@@ -190,8 +190,29 @@ pub(super) fn constants(pipeline: &Pipeline, effects: &Effects) -> Constants {
     known
 }
 
-/// `package::pass`: which path this is, its pixel and its sample.
-pub(super) const PASS: &str = r"/// What the host says about a pass.
+/// `package::pass`: which path this is, its pixel and its sample. Where slots take several paths, they know their numbers.
+pub(super) fn pass(regenerate: bool) -> String {
+    format!("{PASS}{}", if regenerate { TAKEN_NUMBER } else { OWN_NUMBER })
+}
+
+const OWN_NUMBER: &str = r"
+/// Number of the path in the order of pixels, samples one after the other.
+fn path_number() -> u32 {
+    return pass_info.first_pixel + path_id;
+}
+";
+
+const TAKEN_NUMBER: &str = r"
+/// Which path of the pass a slot has.
+var<storage, read_write> path_numbers: array<u32>;
+
+/// Number of the path in the order of pixels, samples one after the other.
+fn path_number() -> u32 {
+    return pass_info.first_pixel + path_numbers[path_id];
+}
+";
+
+const PASS: &str = r"/// What the host says about a pass.
 struct Pass {
     /// Place of slot 0 in the order of pixels.
     first_pixel: u32,
@@ -205,8 +226,9 @@ struct Pass {
     height: u32,
     /// Seed of all random numbers.
     seed: u32,
-    unused_0: u32,
-    unused_1: u32,
+    /// Paths of the pass.
+    paths: u32,
+    unused: u32,
 }
 
 var<uniform> pass_info: Pass;
@@ -216,11 +238,6 @@ override path_count: u32;
 
 /// The path slot of this invocation.
 var<private> path_id: u32;
-
-/// Number of the path in the order of pixels, samples one after the other.
-fn path_number() -> u32 {
-    return pass_info.first_pixel + path_id;
-}
 
 /// Index of the path's pixel, y * width + x. Neighbours in the order of paths are neighbours in a tile of 8 x 8 pixels.
 fn path_pixel() -> u32 {

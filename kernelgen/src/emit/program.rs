@@ -28,7 +28,9 @@ pub(super) struct Program<'a> {
     pub placement: &'a Placement,
     pub queues: &'a Queues,
     pub constants: &'a Constants,
+    /// Of all paths that a slot takes.
     pub rounds: u32,
+    pub paths_per_slot: u32,
     pub tallies: &'a [Tally],
     pub layers: &'a [Layers],
 }
@@ -80,7 +82,7 @@ impl Builder<'_> {
         let program = self.program;
         let fusion = &program.wiring.fusion;
         let start_rays = self.rays(&fusion.start);
-        let begin = self.housekeeping("begin", housekeeping::begin_kernel(start_rays), 64);
+        let begin = self.housekeeping("begin", housekeeping::begin_kernel(start_rays, program.queues.regenerates), 64);
         let first = self.stages(&fusion.start, Source::Slots);
         let consumers = self.consumers();
         let body = self.round(&consumers);
@@ -143,7 +145,7 @@ impl Builder<'_> {
 
     /// Consecutive kernels, by entry, of which none feeds a later one: their queues are complete when the first of them runs.
     fn groups(&self) -> Vec<Vec<String>> {
-        let feeds = |from: &String, to: &String| self.program.wiring.fusion.queued[from].exits.contains(to);
+        let feeds = |from: &String, to: &String| self.program.wiring.fusion.queued[from].feeds.contains(to);
         let mut groups: Vec<Vec<String>> = Vec::new();
         for stage in &self.program.queues.stages {
             match groups.last_mut() {
@@ -209,7 +211,8 @@ impl Builder<'_> {
         };
         let starts_again = source == Source::Slots && wiring.fusion.queued.contains_key(entry);
         let kernel = if starts_again { format!("{entry}_first") } else { entry.to_owned() };
-        let frame = Frame { kernel: &kernel, entry, source, queues, access: &access };
+        let next = (queues.regenerates && chain.ends).then_some(wiring.fusion.start.entry.as_str());
+        let frame = Frame { kernel: &kernel, entry, source, queues, access: &access, next };
         let text = match wiring.stages.get(entry) {
             Some(stage) if !chain.is_fused() => kernel::stage_kernel(frame, stage),
             _ => chain::chain_kernel(frame, wiring, chain),
@@ -318,6 +321,7 @@ impl Builder<'_> {
             bytes_per_path: placement.bytes_per_path(),
             ray_bytes_per_path: placement.ray_bytes_per_path(),
             slots_per_grain: room::slots(self.program.wiring, &self.program.variant.schedule),
+            paths_per_slot: self.program.paths_per_slot,
             needs,
             buffers: buffers.into_values().collect(),
         };
@@ -363,6 +367,7 @@ impl Builder<'_> {
         buffers.extend([
             buffer("queue", Role::Queue, per_path(4 * program.queues.stages.len() as u32)),
             buffer("waits_for", Role::Queue, per_path(4)),
+            buffer("path_numbers", Role::Queue, per_path(4)),
             buffer("control", Role::Control, fixed(4 * program.queues.control_words())),
             buffer("arguments", Role::Arguments, fixed(12 * program.queues.count().max(1))),
         ]);

@@ -30,6 +30,8 @@ pub(super) struct Queues {
     pub streams: Vec<String>,
     /// How a path finds its place; with `None`, paths are marked instead.
     pub kind: QueueKind,
+    /// Whether a slot whose path is over takes the next.
+    pub regenerates: bool,
     /// Threads in a workgroup of the kernels that take from them.
     pub workgroup: u32,
 }
@@ -38,7 +40,7 @@ impl Queues {
     /// No queue.
     pub(super) fn none(workgroup: u32) -> Queues {
         let (stages, ordered, streams) = (Vec::new(), Vec::new(), Vec::new());
-        Queues { stages, ordered, streams, kind: QueueKind::None, workgroup }
+        Queues { stages, ordered, streams, kind: QueueKind::None, regenerates: false, workgroup }
     }
 
     /// Queues in all.
@@ -64,6 +66,11 @@ impl Queues {
 
     /// Words of the control buffer.
     pub(super) fn control_words(&self) -> u32 {
+        self.taken_word() + u32::from(self.regenerates)
+    }
+
+    /// The word that counts the paths which slots have taken, behind those of the queues.
+    fn taken_word(&self) -> u32 {
         WORDS.len() as u32 + 2 * self.count()
     }
 }
@@ -92,6 +99,10 @@ pub(super) fn control_module(queues: &Queues, rounds: u32) -> String {
         WORDS.len(),
         WORDS.len() + 1,
     );
+    if queues.regenerates {
+        let word = queues.taken_word();
+        let _ = write!(text, "\n/// Paths of the pass that slots have taken.\nconst CONTROL_TAKEN: u32 = {word}u;\n");
+    }
     text.push_str(COUNT_WALK_RAYS);
     text.push_str(COUNT_RAY);
     text.push_str(FUSED);
@@ -185,6 +196,10 @@ pub(super) fn queue_module(queues: &Queues) -> String {
         text.push_str(ORDER);
     }
     text.push_str(APPEND);
+    if queues.regenerates {
+        text =
+            format!("import package::control::CONTROL_TAKEN;\nimport package::pass::path_numbers;\n{text}{TAKE_NEXT}");
+    }
     let threads = match kind {
         QueueKind::None => {
             format!("select(entries, pass_info.slots, entries > 0u && number < {}u)", queues.stages.len())
@@ -348,6 +363,37 @@ const APPEND: &str = r"
 /// Takes the next place of a stream.
 fn append(number: u32) -> u32 {
     return atomicAdd(&control[waiting_word(number)], 1u);
+}
+";
+
+const TAKE_NEXT: &str = r"
+/// Paths of this workgroup that are over.
+var<workgroup> endings: atomic<u32>;
+/// The first path that their slots take.
+var<workgroup> first_taken: u32;
+
+/// Gives a slot whose path is over the next path of the pass, and says whether there was one. One atomic a workgroup; `lane` numbers
+/// its invocations, which must all call it.
+fn take_next_path(over: bool, path: u32, lane: u32) -> bool {
+    if lane == 0u {
+        atomicStore(&endings, 0u);
+    }
+    workgroupBarrier();
+    var rank = 0u;
+    if over {
+        rank = atomicAdd(&endings, 1u);
+    }
+    workgroupBarrier();
+    if lane == 0u && atomicLoad(&endings) > 0u {
+        first_taken = atomicAdd(&control[CONTROL_TAKEN], atomicLoad(&endings));
+    }
+    workgroupBarrier();
+    let number = first_taken + rank;
+    if !over || number >= pass_info.paths {
+        return false;
+    }
+    path_numbers[path] = number;
+    return true;
 }
 ";
 

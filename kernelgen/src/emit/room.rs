@@ -11,6 +11,14 @@ use crate::config::model::Schedule;
 use crate::plan::SLOT_GRAIN;
 use indexmap::IndexMap;
 
+/// Rounds of a pass at most: 32-bit counters of rays must survive it.
+const MOST_ROUNDS: u32 = 1000;
+
+/// Paths that a pass may have for each slot, if one takes so many rounds.
+pub(super) fn paths_per_slot(schedule: &Schedule, rounds: u32) -> u32 {
+    schedule.regenerate.value.min(MOST_ROUNDS / rounds.max(1)).max(1)
+}
+
 /// Records that a batched stream has room for, for every `SLOT_GRAIN` path slots.
 pub(super) fn records(schedule: &Schedule) -> u32 {
     (schedule.capacity.value * f64::from(SLOT_GRAIN)) as u32
@@ -47,7 +55,7 @@ pub(super) fn ahead<'a>(
 
 /// `ahead` for paths that wait for kernels which a round has yet to run: those behind the first `done`.
 pub(super) fn ahead_in_round(fusion: &Fusion, done: usize, pushes: &IndexMap<String, u32>) -> IndexMap<String, u32> {
-    let leads = |from: &str, to: &str| fusion.queued.get(from).is_some_and(|chain| chain.exits.contains(to));
+    let leads = |from: &str, to: &str| fusion.queued.get(from).is_some_and(|chain| chain.feeds.contains(to));
     ahead(fusion.queued.keys().skip(done), leads, pushes)
 }
 

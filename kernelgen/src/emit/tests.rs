@@ -472,6 +472,31 @@ fn walks_are_traced_and_scattered_in_one_kernel() {
 }
 
 #[test]
+fn a_slot_whose_path_is_over_takes_the_next() {
+    let plan = generated(&[("schedule.regenerate", "4")]).plan;
+    assert_eq!(plan.paths_per_slot, 4);
+    let Some(Step::Loop { rounds: 20, body }) = plan.program.get(2) else { panic!("{:?}", plan.program) };
+    assert_eq!(names(&plan, body)[..2], ["prepare_emit", "emit"]);
+    let expected = "
+    let again = take_next_path(begun && !(outcome == SCATTERED), path_id, lane);
+    enqueue(QUEUE_EMIT, again, path_id, lane);
+}";
+    let shade = &kernel(&plan, "shade").module;
+    assert!(shade.contains(expected), "{shade}");
+    assert!(shade.contains("pass_info.first_pixel + path_numbers[path_id]"), "{shade}");
+    assert!(kernel(&plan, "emit_first").module.contains("path_numbers[index] = index;"));
+    assert!(kernel(&plan, "begin").module.contains("select(0u, pass_info.slots, word == CONTROL_TAKEN)"));
+    for name in ["emit_first", "emit"] {
+        assert!(!kernel(&plan, name).module.contains("take_next_path"), "no path is over in `{name}`");
+    }
+    let once = generated(&[("schedule.regenerate", "1")]).plan;
+    assert_eq!(once.paths_per_slot, 1);
+    assert!(once.kernels.iter().all(|kernel| !kernel.module.contains("path_numbers")));
+    let longest = generated(&[("schedule.regenerate", "16"), ("max_edges", "300")]).plan;
+    assert_eq!(longest.paths_per_slot, 3, "a pass has 1,000 rounds at most");
+}
+
+#[test]
 fn what_cannot_be_fused_is_refused() {
     let code = |fuse: &str| {
         let result = crate::generate(&sources(PIPELINE, LAYOUT, STAGES), &selection(&[("schedule.fuse", fuse)]));
@@ -485,6 +510,9 @@ fn what_cannot_be_fused_is_refused() {
     assert_eq!(code(r#"[["trace", "shda"]]"#), "K0202");
     assert_eq!(code(r#"[["trace", "shade"], ["shade", "emit"]]"#), "K0225");
     assert_eq!(code("all"), "K0226", "the stream is batched");
+    let set = [("schedule.fuse", "all"), ("schedule.batch", "[]"), ("schedule.regenerate", "2")];
+    let refusal = crate::generate(&sources(PIPELINE, LAYOUT, STAGES), &selection(&set)).expect_err("its own queue");
+    assert_eq!(refusal.diagnostics[0].code, "K0227");
 }
 
 #[test]

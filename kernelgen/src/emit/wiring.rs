@@ -97,6 +97,11 @@ impl WiredStage {
         self.targets().any(|target| target == stage)
     }
 
+    /// Whether an outcome that comes ends the path.
+    pub(super) fn may_end(&self) -> bool {
+        self.facts.outcomes.keys().any(|outcome| !self.routes.iter().any(|(routed, _)| routed == outcome))
+    }
+
     /// The constants of the outcomes that lead to each stage.
     pub(super) fn outcomes_by_target(&self) -> IndexMap<&str, Vec<String>> {
         let mut targets: IndexMap<&str, Vec<String>> = IndexMap::new();
@@ -114,7 +119,8 @@ impl WiredStage {
 /// K0209 a stage that routes to itself, K0211 a consumer that asks for its path, K0212 a consumer that pushes, K0215 a function that
 /// is no stage, K0217 pushes to a batched stream in a loop, K0219 two parameters for one instance, K0220 an instance for a parameter
 /// that is not there, K0221 a consumer that takes something else than one record, K0222 a batched
-/// stream without room for a round, K0226 pushes to a batched stream in a loop of fused stages; K03xx of the stage texts.
+/// stream without room for a round, K0226 pushes to a batched stream in a loop of fused stages, K0227 slots that
+/// would take new paths in the kernel that begins them; K03xx of the stage texts.
 /// Warnings: K0204 an outcome that never comes, K0205 a stage that nothing reaches.
 pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Diagnostic>> {
     let mut wirer = Wirer {
@@ -128,7 +134,8 @@ pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Di
     let reached = wirer.reach();
     wirer.keep_reached(&reached);
     let start = &variant.pipeline.start.value;
-    wirer.wiring.fusion = Fusion::new(&wirer.wiring.stages, start, &variant.schedule.fuse.value);
+    wirer.wiring.fusion = Fusion::new(&wirer.wiring.stages, start, &variant.schedule);
+    wirer.check_regeneration();
     wirer.wire_streams();
     if wirer.findings.is_empty() { Ok(wirer.wiring) } else { Err(distinct(wirer.findings)) }
 }
@@ -207,6 +214,24 @@ impl Wirer<'_> {
                 );
             }
         }
+    }
+
+    /// K0227: a kernel that takes paths from a queue cannot fill that queue.
+    fn check_regeneration(&mut self) {
+        let schedule = &self.variant.schedule;
+        let start = &self.variant.pipeline.start;
+        let chain = self.wiring.fusion.queued.get(&start.value);
+        if schedule.regenerate.value == 1 || !chain.is_some_and(|chain| chain.ends) {
+            return;
+        }
+        let message = format!("paths may be over in the kernel `{}`, which begins them", start.value);
+        self.findings.push(
+            Diagnostic::error("K0227", message)
+                .at(schedule.regenerate.span, "a slot whose path is over waits for that kernel")
+                .also(schedule.fuse.span, "which stages share it")
+                .also(start.span, "the start")
+                .help("write `regenerate = 1`, or fuse the start with no stage that ends paths"),
+        );
     }
 
     /// Whether stages ask for an effect that is absent: what it alone would return or reach is missing for a good reason.

@@ -100,6 +100,7 @@ fn plan(film: Accumulate) -> Plan {
         film,
         bytes_per_path: 4,
         slots_per_grain: SLOT_GRAIN,
+        paths_per_slot: 1,
         needs: Needs { subgroup: false, int64_atomics: fixed, float32_atomics: !fixed },
     }
 }
