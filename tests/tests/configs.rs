@@ -43,12 +43,11 @@ fn every_layout_renders_one_sample() {
     }
 }
 
+/// What other pipelines make of them is compared in `schedules` and `streams`.
 #[test]
 fn every_schedule_renders_one_sample() {
     for schedule in Axis::Schedule.names() {
-        for pipeline in ["pt", "sbdpt"] {
-            assert_renders(&job(pipeline).schedule(schedule), &format!("{pipeline}, {schedule}"));
-        }
+        assert_renders(&job("pt").schedule(schedule), schedule);
     }
 }
 

@@ -3,10 +3,10 @@
 use runtime::configs::Axis;
 use tests::rendering::{Job, Rendering, shipped};
 
-/// A picture that does not fill its tiles, of paths long enough to go round and round. Bidirectional kernels are large: they have a
-/// scene with few effects.
+/// A picture that does not fill its tiles, of paths long enough to go round and round. The smallest pipeline has a scene with every
+/// kind of light, the others one that gives small kernels.
 fn job(pipeline: &str) -> Job {
-    let scene = if pipeline.starts_with("sbdpt") { "cornell_box" } else { "light_kinds" };
+    let scene = if pipeline == "nee" { "light_kinds" } else { "cornell_box" };
     Job::of_file(shipped(scene)).pipeline(pipeline).size(20, 12).samples(2).edges(6).fixed_point()
 }
 
