@@ -51,7 +51,10 @@ fn every_layout_gives_the_same_bits() {
     for pipeline in ["nee", "pt", "lt", "sbdpt", "sbdpt_seed"] {
         let expected = job(pipeline).layout("aos").render();
         assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
-        for layout in layouts(true).into_iter().filter(|layout| *layout != "aos") {
+        // Every layout with the two pipelines that most is built on; with the others those that place fields most unlike `aos`.
+        let all = ["pt", "sbdpt"].contains(&pipeline);
+        let few = |layout: &&str| all || ["seed_aos", "split_compact"].contains(layout);
+        for layout in layouts(true).into_iter().filter(|layout| *layout != "aos").filter(few) {
             let job = job(pipeline).layout(layout);
             if let Err(refusal) = job.check() {
                 let of_another = ["no such field", "is placed nowhere"].iter().any(|reason| refusal.contains(reason));

@@ -19,7 +19,8 @@ fn assert_same(rendering: &Rendering, expected: &Rendering, what: &str) {
     assert_eq!(rendering.rejected, 0, "{what}");
 }
 
-/// Against `wavefront`: every shipped schedule but those that `streams` compares.
+/// Against `wavefront`, and against a layout that shares nothing with one whose fields share all they can: every shipped schedule but
+/// those that `streams` compares.
 #[track_caller]
 fn every_schedule(pipeline: &str) {
     let expected = job(pipeline).render();
@@ -27,7 +28,7 @@ fn every_schedule(pipeline: &str) {
     assert!(expected.walk_rays.iter().all(|&rays| rays > 0), "{pipeline}: rays of all kinds, not {expected:?}");
     for schedule in Axis::Schedule.names().into_iter().filter(|name| !["wavefront", "inline", "ordered"].contains(name))
     {
-        let rendering = job(pipeline).schedule(schedule).render();
+        let rendering = job(pipeline).schedule(schedule).layout("compact").render();
         assert_same(&rendering, &expected, &format!("{pipeline}, {schedule}"));
         if !["walks", "regenerating"].contains(&schedule) {
             assert_eq!(rendering.walk_rays, expected.walk_rays, "{pipeline}, {schedule}: rays by kind");

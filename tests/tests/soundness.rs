@@ -21,7 +21,7 @@ fn garbage_in_what_is_not_loaded_changes_nothing() {
     }
 }
 
-/// Programs of random reads, writes and ways between stages.
+/// Programs of random reads, writes and ways between stages, in random tables, orders, lanes and codecs.
 #[test]
 fn random_programs_do_the_same_in_shared_words() {
     for seed in 1..=8 {
@@ -103,8 +103,13 @@ impl Program {
             .expect("strings can be written to");
         library.sources.add(FileKind::Config, "pipelines/program.toml", "program.toml", pipeline);
         library.sources.add(FileKind::Module, "stage/program", "program.wgsl", stages.as_str());
-        let split = "extends = \"compact.toml\"\n\n[layout]\norder = \"aos\"\nlane = 4\n\n[layout.tables]\n\
-                     one = [\"path\", \"x\"]\ntwo = [\"y\"]\n";
+        // Spectra are small whole numbers here, which these codecs keep as they are.
+        let codec = ["rgbe", "rgb9e5", "rgb13e9", "f16x3"][self.below(4)];
+        let (order, lane) = (["aos", "soa", "aosoa8"][self.below(3)], [1, 2, 4][self.below(3)]);
+        let split = format!(
+            "extends = \"compact.toml\"\n\n[layout]\norder = \"{order}\"\nlane = {lane}\n\n[layout.encode]\n\
+             spectrum = \"{codec}\"\n\n[layout.tables]\none = [\"path\", \"x\"]\ntwo = [\"y\"]\n"
+        );
         library.sources.add(FileKind::Config, "layouts/split.toml", "split.toml", split);
         stages
     }

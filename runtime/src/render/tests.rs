@@ -99,6 +99,7 @@ fn plan(film: Accumulate) -> Plan {
         layers: Vec::new(),
         film,
         bytes_per_path: 4,
+        ray_bytes_per_path: 0,
         slots_per_grain: SLOT_GRAIN,
         paths_per_slot: 1,
         needs: Needs { subgroup: false, int64_atomics: fixed, float32_atomics: !fixed },
