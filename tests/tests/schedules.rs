@@ -71,6 +71,8 @@ fn groups_of_stages_give_the_same_bits() {
         let job = job("sbdpt").schedule(schedule).set("schedule.fuse", groups).set("schedule.queue", queue);
         assert_same(&job.render(), &expected, groups);
     }
+    let late = job("sbdpt").schedule("walks").set("schedule.load", "use").layout("split_compact").render();
+    assert_same(&late, &expected, "fields loaded with the first stage that uses them");
 }
 
 /// 1,024 slots take 4,096 paths in one pass, whatever their kernels are, and their streams are emptied in time.

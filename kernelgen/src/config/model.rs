@@ -310,6 +310,8 @@ pub struct Schedule {
     pub order: PathOrder,
     /// Threads in a workgroup.
     pub workgroup: Spanned<u32>,
+    /// When fields enter registers.
+    pub load: LoadAt,
     /// How the film adds.
     pub accumulate: Accumulate,
     /// Paths of a pass for each slot: with more than one, a slot whose path is over takes the next.
@@ -343,6 +345,17 @@ pub enum QueueKind {
     Workgroup,
     /// There are no queues: every kernel looks at every slot, and takes the paths that wait for it.
     None,
+}
+
+/// When the fields of a path enter registers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LoadAt {
+    /// When the kernel begins.
+    #[default]
+    Entry,
+    /// When the first stage of the kernel runs that uses them: paths that take other ways do not load them.
+    Use,
 }
 
 /// In what order stages take their paths.

@@ -1,7 +1,7 @@
 //! The schedule axis and the precision axis.
 
 use super::merge::AxisFile;
-use super::model::{Accumulate, Fuse, PathOrder, Precision, QueueKind, Real, Schedule};
+use super::model::{Accumulate, Fuse, LoadAt, PathOrder, Precision, QueueKind, Real, Schedule};
 use super::section::{Findings, Item, Section};
 use super::tree::Data;
 use crate::diagnostic::Diagnostic;
@@ -34,6 +34,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let workgroup = section.require("workgroup", "threads in a workgroup: `workgroup = 64`", findings);
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
+    let load = section.get("load").and_then(|item| item.word(&["entry", "use"], findings));
     let order = section.get("order").and_then(|item| item.word(&["arrival", "slot"], findings));
     let regenerate = match section.get("regenerate") {
         Some(item) => {
@@ -52,6 +53,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup, QueueKind::None][queue?],
         order: [PathOrder::Arrival, PathOrder::Slot][order.unwrap_or_default()],
         workgroup: workgroup?,
+        load: [LoadAt::Entry, LoadAt::Use][load.unwrap_or_default()],
         regenerate: regenerate?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
         batch: batch.unwrap_or_default(),
@@ -75,9 +77,6 @@ fn word(section: &Section<'_>, key: &str, words: &[&str], findings: &mut Finding
 
 /// The keys that have only one value so far.
 fn check_fixed(section: &Section<'_>, findings: &mut Findings) {
-    if let Some(load) = section.get("load") {
-        load.word(&["entry"], findings);
-    }
     if let Some(until) = section.get("until") {
         until.word(&["empty"], findings);
     }

@@ -7,9 +7,12 @@
 
 use super::fusion::Chain;
 use super::kernel::{Filling, Frame, Source, call};
+use super::memory::Late;
 use super::text::{Imports, next_constant};
 use super::wiring::Wiring;
+use crate::analyze::{KernelTraffic, Leaf};
 use crate::config::model::RayKind;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// `package::next`: what a path goes on with inside a kernel.
@@ -24,13 +27,17 @@ pub(super) fn module(wiring: &Wiring) -> String {
 
 /// The kernel of a chain.
 pub(super) fn chain_kernel(frame: Frame<'_>, wiring: &Wiring, chain: &Chain) -> String {
-    let mut writer = Writer { wiring, chain, source: frame.source, imports: Imports::default() };
+    let mut writer =
+        Writer { wiring, chain, source: frame.source, late: &frame.access.late, imports: Imports::default() };
     let body = writer.body();
     let targets = chain.exits.iter().map(|exit| (exit.clone(), writer.goes_on_with(exit))).collect();
     let stages = || chain.stages.iter().map(|name| &wiring.stages[name]);
     let mut filling = Filling { body, targets, ..Filling::default() };
     filling.locals = "    var next = NEXT_END;\n".to_owned();
     writer.imports.add("next", ["NEXT_END"]);
+    for group in 0..frame.access.late.len() {
+        let _ = writeln!(filling.locals, "    var {} = false;", loaded_flag(group));
+    }
     if stages().any(|stage| stage.rays.is_some()) {
         writer.imports.add("control", ["add_rays"]);
         filling.locals.push_str("    var rays = vec4u();\n");
@@ -48,7 +55,35 @@ struct Writer<'a> {
     wiring: &'a Wiring,
     chain: &'a Chain,
     source: Source,
+    late: &'a [Late],
     imports: Imports,
+}
+
+/// Whether a group of late loads has been loaded.
+fn loaded_flag(group: usize) -> String {
+    format!("loaded_{group}")
+}
+
+/// The leaves that a kernel of several stages may load late, by the stages that use them: those that the entry does not touch, and that
+/// are not stored at the end, where they might not have been loaded. Whichever of their stages runs first finds them as they were in
+/// memory, since no other stage touches them.
+pub(super) fn late_leaves(
+    wiring: &Wiring,
+    chain: &Chain,
+    traffic: &KernelTraffic,
+) -> BTreeMap<BTreeSet<String>, BTreeSet<Leaf>> {
+    let mut late: BTreeMap<BTreeSet<String>, BTreeSet<Leaf>> = BTreeMap::new();
+    for leaf in traffic.loads.difference(&traffic.stores) {
+        let touches = |name: &&String| {
+            let facts = &wiring.stages[*name].facts;
+            [&facts.reads, &facts.writes, &facts.maybe].iter().any(|leaves| leaves.contains_key(leaf))
+        };
+        let stages: BTreeSet<String> = chain.stages.iter().filter(touches).cloned().collect();
+        if !stages.contains(&chain.entry) {
+            late.entry(stages).or_default().insert(leaf.clone());
+        }
+    }
+    late
 }
 
 impl Writer<'_> {
@@ -109,7 +144,7 @@ impl Writer<'_> {
         let indent = "    ".repeat(depth);
         let stage = &self.wiring.stages[name];
         self.imports.add(&stage.entry.module, [stage.entry.name.as_str()]);
-        let mut text = String::new();
+        let mut text = self.late_loads(name, &indent);
         match stage.rays {
             Some(RayKind::Walk) => {
                 self.imports.add("control", ["walk_ray"]);
@@ -132,6 +167,20 @@ impl Writer<'_> {
             let _ = writeln!(text, "{indent}    case {}: {{ next = {next}; }}", outcomes.join(", "));
         }
         let _ = writeln!(text, "{indent}    default: {{ next = NEXT_END; }}\n{indent}}}");
+        text
+    }
+
+    /// What the stage uses and no stage before it has loaded.
+    fn late_loads(&self, name: &str, indent: &str) -> String {
+        let mut text = String::new();
+        for (group, late) in self.late.iter().enumerate().filter(|(_, late)| late.stages.contains(name)) {
+            let flag = loaded_flag(group);
+            let _ = writeln!(text, "{indent}if !{flag} {{\n{indent}    {flag} = true;");
+            for load in &late.loads {
+                let _ = writeln!(text, "{indent}    {load}");
+            }
+            let _ = writeln!(text, "{indent}}}");
+        }
         text
     }
 

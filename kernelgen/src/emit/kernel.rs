@@ -156,11 +156,11 @@ fn loaded(instances: &IndexMap<String, String>, access: &Access, imports: &mut I
     for load in &access.loads {
         let _ = writeln!(text, "        {load}");
     }
-    if access.loads.iter().any(|load| load.contains("bitcast<")) {
+    if access.all_loads().any(|load| load.contains("bitcast<")) {
         let types = ["real", "vec2r", "vec3r"];
         let used = types.iter().filter(|ty| {
             let cast = format!("bitcast<{ty}>");
-            access.loads.iter().any(|load| load.contains(&cast))
+            access.all_loads().any(|load| load.contains(&cast))
         });
         imports.add("real", used.copied());
     }

@@ -65,7 +65,7 @@ pub(super) struct Access {
     pub loads: Vec<String>,
     /// Statements that write them back.
     pub stores: Vec<String>,
-    /// Bytes that the loads move.
+    /// Bytes that the loads move, late ones included.
     pub load_bytes: u32,
     /// Bytes that the stores move.
     pub store_bytes: u32,
@@ -73,17 +73,58 @@ pub(super) struct Access {
     pub buffers: BTreeSet<String>,
     /// Functions of codecs used: the codec's name, and the function's.
     pub codecs: BTreeSet<(String, String)>,
+    /// Loads that wait until a stage needs them.
+    pub late: Vec<Late>,
 }
 
-/// The statements that move a kernel's leaves between tables and instances.
-pub(super) fn access(placement: &Placement, traffic: &KernelTraffic) -> Access {
-    let memory = Memory { placement, traffic, words: words(placement) };
+/// Fields that a kernel of several stages loads when the first stage runs that uses them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Late {
+    /// The stages that use them.
+    pub stages: BTreeSet<String>,
+    /// Statements that fill the instances.
+    pub loads: Vec<String>,
+}
+
+impl Access {
+    /// All statements that fill instances.
+    pub(super) fn all_loads(&self) -> impl Iterator<Item = &String> {
+        self.loads.iter().chain(self.late.iter().flat_map(|late| &late.loads))
+    }
+}
+
+/// The statements that move a kernel's leaves between tables and instances; `late` are leaves to be loaded later, by the stages that
+/// use them.
+pub(super) fn access(
+    placement: &Placement,
+    traffic: &KernelTraffic,
+    late: &BTreeMap<BTreeSet<String>, BTreeSet<Leaf>>,
+) -> Access {
+    let is_late = |leaf: &Leaf| late.values().any(|leaves| leaves.contains(leaf));
+    let first = traffic.loads.iter().filter(|leaf| !is_late(leaf)).cloned().collect();
+    let traffic = KernelTraffic { loads: first, ..traffic.clone() };
+    let memory = Memory { placement, traffic: &traffic, words: words(placement) };
     let mut access = Access::default();
     let loaded = memory.load_lanes(&mut access);
     memory.fill_leaves(&loaded, &mut access);
     memory.encode_leaves(&mut access);
     memory.store_lanes(&loaded, &mut access);
+    for (stages, leaves) in late {
+        push_late(placement, stages, leaves, &mut access);
+    }
     access
+}
+
+fn push_late(placement: &Placement, stages: &BTreeSet<String>, leaves: &BTreeSet<Leaf>, access: &mut Access) {
+    let traffic = KernelTraffic { loads: leaves.clone(), ..KernelTraffic::default() };
+    let memory = Memory { placement, traffic: &traffic, words: words(placement) };
+    let mut own = Access::default();
+    let loaded = memory.load_lanes(&mut own);
+    memory.fill_leaves(&loaded, &mut own);
+    access.load_bytes += own.load_bytes;
+    access.buffers.extend(own.buffers);
+    access.codecs.extend(own.codecs);
+    access.late.push(Late { stages: stages.clone(), loads: own.loads });
 }
 
 /// A word of a record: index of the table, index of the word.

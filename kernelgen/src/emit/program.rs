@@ -11,14 +11,14 @@ use super::stream;
 use super::tally;
 use super::wiring::Wiring;
 use crate::analyze::{self, Liveness};
-use crate::config::model::{Accumulate, QueueKind, RayKind, Variant};
+use crate::config::model::{Accumulate, LoadAt, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
 use crate::layout::Placement;
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
 use crate::plan::{self, Binding, Buffer, Counter, Kernel, Layers, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What the program is built from.
 pub(super) struct Program<'a> {
@@ -206,7 +206,13 @@ impl Builder<'_> {
         let Program { wiring, queues, liveness, .. } = *self.program;
         let entry = chain.entry.as_str();
         let access = match liveness.kernels.get(entry) {
-            Some(traffic) => memory::access(self.program.placement, traffic),
+            Some(traffic) => {
+                let late = match self.program.variant.schedule.load {
+                    LoadAt::Use => chain::late_leaves(wiring, chain, traffic),
+                    LoadAt::Entry => BTreeMap::new(),
+                };
+                memory::access(self.program.placement, traffic, &late)
+            }
             None => Access::default(),
         };
         let starts_again = source == Source::Slots && wiring.fusion.queued.contains_key(entry);

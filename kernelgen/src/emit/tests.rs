@@ -403,6 +403,26 @@ fn a_megakernel_stores_nothing_and_waits_for_nothing() {
     assert!(module.contains("const ROUNDS: u32 = 5u;"), "{module}");
 }
 
+/// A path that leaves with the first stage does not load what only the second one uses.
+#[test]
+fn fields_are_loaded_with_the_first_stage_that_uses_them() {
+    let groups = ("schedule.fuse", r#"[["trace", "shade"]]"#);
+    let [entry, late] = ["entry", "use"].map(|load| {
+        let plan = generated(&[groups, ("schedule.batch", "[]"), ("schedule.load", load)]).plan;
+        kernel(&plan, "trace").clone()
+    });
+    assert!(late.load_bytes >= entry.load_bytes, "a lane is loaded twice if its words are used at different times");
+    assert!(!entry.module.contains("loaded_0"));
+    let waits = "            if next == NEXT_SHADE {
+                if !loaded_0 {
+                    loaded_0 = true;
+";
+    assert!(late.module.contains("    var loaded_0 = false;\n") && late.module.contains(waits), "{}", late.module);
+    let (before, after) = late.module.split_once(waits).unwrap();
+    assert!(!before.contains("eye.throughput = ") && after.contains("eye.throughput = "), "{}", late.module);
+    assert!(before.contains("eye.position = "), "the entry uses it");
+}
+
 #[test]
 fn a_group_without_a_way_back_is_a_straight_kernel() {
     let pipeline = PIPELINE.replace("on.scattered = \"trace\"", "on.scattered = \"last\"")
