@@ -115,20 +115,22 @@ fn degenerate_triangles_are_harmless() {
 /// that leaves there gets away. Below a sky of radiance 1 it has the radiance of its albedo, from wherever it is seen.
 #[test]
 fn plates_thinner_than_rounding_are_lit() {
-    for height in [0.7, 2.0, 13.0] {
+    for height in [2.0, 3.3, 13.0] {
         let mut scene = SceneBuilder::new();
         let plate = scene.material(Material::lambert("plate", [0.5; 3]).two_sided());
         scene.floor(plate, 0.0, 16e3);
-        scene.ceiling(plate, -1.6e-7, 16e3);
+        scene.ceiling(plate, -6e-8, 16e3);
         let camera = Camera { eye: DVec3::Y * height, target: dvec3(0.3, 0.0, 0.2), yfov: 60.0, aspect: 1.0 };
         scene.camera("main", camera);
         let scene = BuiltScene::new(&scene, Some(&Sky::constant([1.0; 3])));
         let job = scene.job().pipeline("pt").edges(2).size(32, 32).samples(64);
         let lit = job.render().pixels.mean_estimate();
         assert!(lit.z(&Estimate::exact(0.5), 1e-4).abs() < 4.5, "{lit:?} from a height of {height}, expected 0.5");
-        let undecided = job.edited("trace/triangle", "(side + DISTANCE_TOLERANCE)", "side").render();
-        let dark = undecided.pixels.mean_estimate();
-        assert!(dark.mean < 0.49, "{dark:?}: from {height} rounding chooses the right side by itself");
+        if height == 2.0 {
+            let undecided = job.edited("trace/triangle", "(side + DISTANCE_TOLERANCE)", "side").render();
+            let dark = undecided.pixels.mean_estimate();
+            assert!(dark.mean < 0.45, "{dark:?}: the test would not see rounding decide");
+        }
     }
 }
 
