@@ -179,6 +179,8 @@ pub struct Stage {
     pub on: IndexMap<String, Spanned<String>>,
     /// What rays of this stage are counted as.
     pub rays: Option<RayKind>,
+    /// Keys by which a schedule may sort the paths that wait for it, and their WGSL functions: `sort.material = "material_key"`.
+    pub sort: IndexMap<String, Spanned<String>>,
 }
 
 /// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced. Where a kernel
@@ -308,6 +310,8 @@ pub struct Schedule {
     pub queue: QueueKind,
     /// In what order stages take their paths.
     pub order: PathOrder,
+    /// Keys of stages by which paths are sorted before the stage takes them. Where a stage declares several, the first counts.
+    pub sort: Vec<Spanned<String>>,
     /// Threads in a workgroup.
     pub workgroup: Spanned<u32>,
     /// How the film adds.
