@@ -415,7 +415,11 @@ fn what_is_not_sorted_has_no_trace_of_keys() {
         assert!(plan.buffers.iter().all(|buffer| !buffer.name.starts_with("key")), "{set:?}");
     }
     let plan = sorted(&[("schedule.sort", "pole"), fused, inline]).plan;
-    assert_eq!(kernel(&plan, "count_keys_trace").load_bytes, 4, "the entry of a fused kernel has a queue");
+    assert_eq!(
+        kernel(&plan, "count_keys_trace").load_bytes,
+        16,
+        "the entry of a fused kernel: the lane of `direction`"
+    );
 }
 
 #[test]
