@@ -88,13 +88,12 @@ fn slots_that_take_further_paths_give_the_same_bits() {
     }
 }
 
-/// Keys are computed of decoded fields, from tables of their own and where paths enter kernels of several stages.
+/// Keys are computed of decoded fields, from a table of their own and where paths enter a kernel of several stages.
 #[test]
 fn queues_sorted_in_any_layout_and_kernel_give_the_same_bits() {
-    let groups = r#"[["shade_eye", "escape_eye", "extend_light", "trace_light"], ["emit_eye", "shade_light"]]"#;
     let job = |sort: &str| {
-        let job = job("sbdpt").schedule("inline").set("schedule.fuse", groups).set("schedule.sort", sort);
-        job.layout("split_compact_lossy").set("layout.rays", "apart")
+        let job = job("pt").schedule("wavefront").set("schedule.fuse", r#"[["trace_eye", "escape"]]"#);
+        job.set("schedule.sort", sort).layout("split_compact_lossy").set("layout.rays", "apart")
     };
     assert_same(&job(r#"["material", "ray"]"#).render(), &job("none").render(), "both keys");
 }
@@ -118,12 +117,13 @@ fn count_unlike_neighbours(plan: &mut Plan) {
 }
 
 /// The box has four materials, so three places in a sorted queue where neighbours differ: in four workgroups together, not in each.
+/// Keys depend on nothing that their kernels have not loaded.
 #[test]
 fn sorted_paths_shade_like_their_neighbours() {
     let rounds = 6;
     let unlike = |schedule: &str| {
         let job = Job::of_file(shipped("cornell_box")).pipeline("pt").size(32, 32).samples(1).edges(rounds);
-        job.schedule(schedule).probed(count_unlike_neighbours).render().rejected
+        job.schedule(schedule).poisoned().probed(count_unlike_neighbours).render().rejected
     };
     let (unsorted, sorted) = (unlike("ordered"), unlike("sorted_material"));
     assert!(sorted > 0, "there are several materials");
