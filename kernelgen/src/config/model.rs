@@ -173,7 +173,7 @@ pub struct Stage {
     pub span: Span,
     /// The WGSL function; the stage's own name when not given.
     pub entry: Spanned<String>,
-    /// Function parameter to instance, where they differ: `with.walk = "eye"`.
+    /// Parameter to instance, where they differ, of the function and of keys: `with.walk = "eye"`.
     pub with: IndexMap<String, Spanned<String>>,
     /// Outcome (lower case) to stage, or to `end`.
     pub on: IndexMap<String, Spanned<String>>,
