@@ -7,7 +7,7 @@ use crate::layout::{self, Placement, StateLeaf};
 use crate::plan::Plan;
 use crate::source::{Sources, Span};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// The report on a variant.
@@ -140,6 +140,8 @@ pub(crate) struct Findings<'a> {
     pub placement: &'a Placement,
     pub liveness: &'a Liveness,
     pub stages: Vec<(&'a str, &'a StageFacts)>,
+    /// Leaves that the keys of queues depend on, by stage.
+    pub keys: Vec<(&'a str, &'a BTreeMap<Leaf, Span>)>,
     pub effects_seen: &'a BTreeSet<String>,
 }
 
@@ -264,6 +266,9 @@ fn field_use(findings: &Findings<'_>, declared: &StateLeaf) -> FieldUse {
         written.extend(facts.writes.get(leaf).map(|span| at(stage, span)));
         written.extend(facts.maybe.get(leaf).map(|span| format!("{}, perhaps", at(stage, span))));
         read.extend(facts.reads.get(leaf).map(|span| at(stage, span)));
+    }
+    for (stage, reads) in &findings.keys {
+        read.extend(reads.get(leaf).map(|span| format!("key of {}", at(stage, span))));
     }
     let live_out = findings.liveness.kernels.iter().filter(|(_, traffic)| traffic.live_out.contains(leaf));
     FieldUse {

@@ -10,7 +10,8 @@ pub struct Occupancy {
     /// Passes.
     pub passes: u32,
     /// By kernel of the plan, by round: paths, or records of a stream, that it took. Ends with the last round that has any; what runs
-    /// behind the rounds follows the last of them. Empty for housekeeping.
+    /// behind the rounds follows the last of them. Empty for housekeeping that is
+    /// not sized by what waits.
     pub entries: Vec<Vec<u64>>,
 }
 

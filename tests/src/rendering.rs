@@ -5,6 +5,7 @@ use crate::scene_builder::SceneBuilder;
 use crate::sky::Sky;
 use crate::statistics::Pixels;
 use kernelgen::Generated;
+use kernelgen::plan::Plan;
 use kernelgen::report::Report;
 use kernelgen::source::FileKind;
 use runtime::configs::Library;
@@ -55,6 +56,7 @@ pub struct Job {
     samples: u32,
     seed: u32,
     poisoned: bool,
+    probe: Option<fn(&mut Plan)>,
     paths: Option<u32>,
 }
 
@@ -89,6 +91,7 @@ impl Job {
             samples: 64,
             seed: 1,
             poisoned: false,
+            probe: None,
             paths: None,
         }
     }
@@ -173,6 +176,12 @@ impl Job {
         self
     }
 
+    /// Kernels are changed before they run, to measure what happens in them.
+    pub fn probed(mut self, probe: fn(&mut Plan)) -> Job {
+        self.probe = Some(probe);
+        self
+    }
+
     /// Path slots.
     pub fn paths(mut self, paths: u32) -> Job {
         self.paths = Some(paths);
@@ -202,6 +211,9 @@ impl Job {
         let mut plan = self.generate(&scene).unwrap_or_else(|refusal| panic!("{refusal}")).plan;
         if self.poisoned {
             poison(&mut plan);
+        }
+        if let Some(probe) = self.probe {
+            probe(&mut plan);
         }
         if plan.buffers.iter().any(|buffer| buffer.name == "bvh2_nodes") {
             scene.set_accelerator(Accelerator::Bvh2).expect("the hierarchy can be traversed");

@@ -1,5 +1,6 @@
 //! How stages become kernels never changes the image: bit for bit with the fixed-point film, and every ray is counted once.
 
+use kernelgen::plan::Plan;
 use runtime::configs::Axis;
 use tests::rendering::{Job, Rendering, shipped};
 
@@ -78,7 +79,9 @@ fn groups_of_stages_give_the_same_bits() {
 /// 1,024 slots take 4,096 paths in one pass, whatever their kernels are, and their streams are emptied in time.
 #[test]
 fn slots_that_take_further_paths_give_the_same_bits() {
-    for (pipeline, schedules) in [("pt", &["regenerating", "walks", "uncompacted"][..]), ("sbdpt", &["regenerating"])] {
+    for (pipeline, schedules) in
+        [("pt", &["regenerating", "walks", "uncompacted", "sorted_material"][..]), ("sbdpt", &["regenerating"])]
+    {
         let job = Job::of_file(shipped("cornell_box")).pipeline(pipeline).size(64, 64).samples(1).fixed_point();
         let expected = job.clone().render();
         for schedule in schedules {
@@ -86,6 +89,49 @@ fn slots_that_take_further_paths_give_the_same_bits() {
             assert_same(&job.render(), &expected, &format!("{pipeline}, {schedule}"));
         }
     }
+}
+
+/// Keys are computed of decoded fields, from a table of their own and where paths enter a kernel of several stages.
+#[test]
+fn queues_sorted_in_any_layout_and_kernel_give_the_same_bits() {
+    let job = |sort: &str| {
+        let job = job("pt").schedule("wavefront").set("schedule.fuse", r#"[["trace_eye", "escape"]]"#);
+        job.set("schedule.sort", sort).layout("split_compact_lossy").set("layout.rays", "apart")
+    };
+    assert_same(&job(r#"["material", "ray"]"#).render(), &job("none").render(), "both keys");
+}
+
+/// Counts as `rejected` how often neighbours of a workgroup shade different materials.
+fn count_unlike_neighbours(plan: &mut Plan) {
+    let rejected = plan.counters.iter().find(|counter| counter.name == "rejected").expect("the film counts").word;
+    let shade = plan.kernels.iter_mut().find(|kernel| kernel.name == "shade").expect("pt shades");
+    let call = "outcome = shade_mis(";
+    let end = "    enqueue(QUEUE_TRACE_EYE,";
+    assert!([call, end].iter().all(|text| shade.module.matches(text).count() == 1), "{}", shade.module);
+    let noted = format!("shaded[lane] = load_triangle(eye.hit.prim).material + 1u;\n        {call}");
+    let compared = format!(
+        "    workgroupBarrier();\n    \
+         if lane > 0u && shaded[lane] > 0u && shaded[lane] != shaded[max(lane, 1u) - 1u] {{\n        \
+             atomicAdd(&control[{rejected}u], 1u);\n    \
+         }}\n{end}"
+    );
+    let module = shade.module.replacen(call, &noted, 1).replacen(end, &compared, 1);
+    shade.module = format!("{module}\nvar<workgroup> shaded: array<u32, {}>;\n", shade.workgroup);
+}
+
+/// The box has four materials, so three places in a sorted queue where neighbours differ: in four workgroups together, not in each.
+/// Keys depend on nothing that their kernels have not loaded.
+#[test]
+fn sorted_paths_shade_like_their_neighbours() {
+    let rounds = 6;
+    let unlike = |schedule: &str| {
+        let job = Job::of_file(shipped("cornell_box")).pipeline("pt").size(32, 32).samples(1).edges(rounds);
+        job.schedule(schedule).poisoned().probed(count_unlike_neighbours).render().rejected
+    };
+    let (unsorted, sorted) = (unlike("ordered"), unlike("sorted_material"));
+    assert!(sorted > 0, "there are several materials");
+    assert!(sorted <= 3 * u64::from(rounds), "{sorted}");
+    assert!(unsorted > 10 * sorted, "{unsorted} in the order of slots, {sorted} sorted");
 }
 
 /// What would go round for ever is given up and counted: too few rounds fail a render, whoever counts them.

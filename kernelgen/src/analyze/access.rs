@@ -12,7 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What the stage function of this name does.
 ///
-/// `bind` says which instance a parameter stands for; `outcomes` names the values that may be returned (zero is `end`).
+/// `bind` says which instance a parameter stands for; `outcomes` names the values that may be returned (zero is `end`);
+/// without it the function is free in what it returns.
 ///
 /// # Errors
 /// K0208 when there is no such function, K0320 for a returned value that is no named outcome, K0322 for a parameter that is no pointer
@@ -22,7 +23,7 @@ pub fn stage_facts(
     linked: &Linked,
     function: &str,
     bind: &dyn Fn(&str) -> Option<String>,
-    outcomes: &BTreeMap<u32, String>,
+    outcomes: Option<&BTreeMap<u32, String>>,
 ) -> Result<StageFacts, Vec<Diagnostic>> {
     let found = module.functions.iter().find(|(_, candidate)| candidate.name.as_deref() == Some(function));
     let Some((handle, stage)) = found else {
@@ -33,12 +34,12 @@ pub fn stage_facts(
     let mut walk = Walk::new(module, linked, leaves);
     let arguments = (0..stage.arguments.len()).map(Argument::record).collect();
     let end = walk.stage(handle, arguments);
-    let (returned, written_by_outcome) = match stage.result {
-        Some(_) => (
+    let (returned, written_by_outcome) = match (&stage.result, outcomes) {
+        (Some(_), Some(outcomes)) => (
             named_outcomes(&end.exits, linked, function, outcomes)?,
             written_by_outcome(&end.exits, &walk.leaves, outcomes),
         ),
-        None => Default::default(),
+        _ => Default::default(),
     };
     let leaf = |(index, span): (&usize, &Span)| (walk.leaves.get(*index).clone(), *span);
     let written: BTreeMap<Leaf, Span> = walk.stored.iter().map(leaf).collect();

@@ -1,6 +1,7 @@
 //! What lives from one kernel to the next, backwards over the graph of stages.
 
 use super::{Leaf, StageFacts};
+use crate::source::Span;
 use indexmap::IndexMap;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,6 +19,8 @@ pub struct Flow {
 pub struct FlowStage {
     /// What it does.
     pub facts: StageFacts,
+    /// Leaves that the key of the paths which wait for it depends on, with one place where: a kernel before its own reads them.
+    pub key: BTreeMap<Leaf, Span>,
     /// The stages its returned outcomes lead to, `end` left out, and what it has surely written when it leads there.
     pub next: IndexMap<String, BTreeSet<Leaf>>,
     /// Whether it traces the rays of walks.
@@ -78,17 +81,24 @@ fn is_in_flight(flow: &Flow, live: &ByStage<'_>, leaf: &Leaf) -> bool {
 }
 
 fn uses(stage: &FlowStage, leaf: &Leaf) -> bool {
-    stage.facts.reads.contains_key(leaf) || written(stage).any(|written| written == leaf)
+    stage.facts.reads.contains_key(leaf)
+        || stage.key.contains_key(leaf)
+        || written(stage).any(|written| written == leaf)
 }
 
 /// What lives before each stage: solves live_in = reads ∪ ⋃ (live_in of what follows − what is written on the way there), by the least
 /// fixpoint.
 fn live_before(flow: &Flow) -> ByStage<'_> {
-    backwards(flow, |_| true)
+    backwards(flow, |_| true, |stage| stage.facts.reads.keys().chain(stage.key.keys()).collect())
 }
 
-/// As `live_before`, over those stages and ways that `inside` keeps: what is read there before it is surely written.
-fn backwards<'a>(flow: &'a Flow, inside: impl Fn(&str) -> bool) -> ByStage<'a> {
+/// As `live_before`, over those stages and ways that `inside` keeps: what is read there before it is surely written. `reads` says what
+/// a stage reads.
+fn backwards<'a>(
+    flow: &'a Flow,
+    inside: impl Fn(&str) -> bool,
+    reads: impl Fn(&FlowStage) -> Vec<&Leaf>,
+) -> ByStage<'a> {
     let mut live: ByStage<'a> = BTreeMap::new();
     let mut changed = true;
     while changed {
@@ -97,7 +107,7 @@ fn backwards<'a>(flow: &'a Flow, inside: impl Fn(&str) -> bool) -> ByStage<'a> {
             let following = stage.next.iter().filter(|(next, _)| inside(next));
             let following = following.filter_map(|(next, written)| Some((live.get(next.as_str())?, written)));
             let passing = following.flat_map(|(live, written)| live.difference(written));
-            let before: BTreeSet<Leaf> = stage.facts.reads.keys().chain(passing).cloned().collect();
+            let before: BTreeSet<Leaf> = reads(stage).into_iter().chain(passing).cloned().collect();
             changed |= live.get(name.as_str()) != Some(&before);
             live.insert(name, before);
         }
@@ -121,7 +131,7 @@ impl<'a> KernelFlow<'a> {
     fn traffic(&self, live: &ByStage<'_>) -> KernelTraffic {
         let written: BTreeSet<&Leaf> = self.inside().flat_map(|(_, stage)| written(stage)).collect();
         let sure = self.surely_written();
-        let read = backwards(self.flow, |name| self.stages.contains(name));
+        let read = backwards(self.flow, |name| self.stages.contains(name), |stage| stage.facts.reads.keys().collect());
         let mut traffic = KernelTraffic {
             loads: read.get(self.entry).cloned().unwrap_or_default(),
             live_in: live.get(self.entry).cloned().unwrap_or_default(),
@@ -205,7 +215,7 @@ mod tests {
         let map = |names: &str| set(names).into_iter().map(|leaf| (leaf, span)).collect();
         let facts = StageFacts { reads: map(reads), writes: map(writes), maybe: map(maybe), ..StageFacts::default() };
         let next = next.iter().map(|name| (name.to_string(), set(writes))).collect();
-        FlowStage { facts, next, traces: false }
+        FlowStage { facts, key: BTreeMap::new(), next, traces: false }
     }
 
     /// Every stage a kernel of its own.
@@ -292,6 +302,23 @@ mod tests {
         assert_eq!((shade.loads.clone(), shade.stores.clone()), (set("hit"), set("ray")));
         assert_eq!(found.kernels["trace"].live_out, set("hit"));
         assert_eq!(found.in_flight, set("hit ray"));
+    }
+
+    /// `shade` is sorted by the hit, which it does not read itself: it is kept for the key, and not loaded again.
+    #[test]
+    fn what_a_key_reads_lives_until_then() {
+        let mut stages = [
+            ("start", stage("", "ray", "", &["trace"])),
+            ("trace", stage("ray", "hit", "", &["shade"])),
+            ("shade", stage("ray", "ray", "", &["trace"])),
+        ];
+        assert!(solve(&stages).dead.contains_key(&leaf("hit")));
+        stages[2].1.key = [(leaf("hit"), Span { file: FileId(0), start: 0, end: 0 })].into();
+        let found = solve(&stages);
+        assert_eq!((found.kernels["trace"].stores.clone(), found.stored), (set("hit"), set("hit ray")));
+        assert_eq!(found.kernels["shade"].loads, set("ray"));
+        assert_eq!(found.kernels["shade"].live_in, set("hit ray"));
+        assert!(found.dead.is_empty());
     }
 
     /// Only `shade` has written `flux` for sure, and only if the path went through it.

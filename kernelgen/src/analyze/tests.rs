@@ -34,7 +34,7 @@ fn analyse(stage: &str) -> (Sources, Result<StageFacts, Vec<Diagnostic>>) {
         validate(&module, &linked)?;
         let outcomes = BTreeMap::from([(1, "hit".to_string()), (2, "miss".to_string())]);
         let bind = |name: &str| Some(if name == "walk" { "eye".to_string() } else { name.to_string() });
-        stage_facts(&module, &linked, "f", &bind, &outcomes)
+        stage_facts(&module, &linked, "f", &bind, Some(&outcomes))
     });
     (sources, facts)
 }

@@ -173,12 +173,14 @@ pub struct Stage {
     pub span: Span,
     /// The WGSL function; the stage's own name when not given.
     pub entry: Spanned<String>,
-    /// Function parameter to instance, where they differ: `with.walk = "eye"`.
+    /// Parameter to instance, where they differ, of the function and of keys: `with.walk = "eye"`.
     pub with: IndexMap<String, Spanned<String>>,
     /// Outcome (lower case) to stage, or to `end`.
     pub on: IndexMap<String, Spanned<String>>,
     /// What rays of this stage are counted as.
     pub rays: Option<RayKind>,
+    /// Keys by which a schedule may sort the paths that wait for it, and their WGSL functions: `sort.material = "material_key"`.
+    pub sort: IndexMap<String, Spanned<String>>,
 }
 
 /// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced. Where a kernel
@@ -308,6 +310,8 @@ pub struct Schedule {
     pub queue: QueueKind,
     /// In what order stages take their paths.
     pub order: PathOrder,
+    /// Keys of stages by which paths are sorted before the stage takes them. Where a stage declares several, the first counts.
+    pub sort: Vec<Spanned<String>>,
     /// Threads in a workgroup.
     pub workgroup: Spanned<u32>,
     /// When fields enter registers.

@@ -237,7 +237,7 @@ fn stages(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Stage>
     for item in top.entries("stages", findings) {
         name::check("stage", &item, findings);
         let Some(section) = item.section(findings) else { continue };
-        section.allow(&["entry", "with", "on", "rays"], findings);
+        section.allow(&["entry", "with", "on", "rays", "sort"], findings);
         let own_name = Spanned { value: item.name.to_owned(), span: item.key };
         let entry = section.get("entry").and_then(|entry| entry.text(findings));
         let stage = Stage {
@@ -246,6 +246,7 @@ fn stages(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Stage>
             with: names(&section, "with", "function parameter", findings),
             on: outcomes(&section, findings),
             rays: rays(&section, findings),
+            sort: names(&section, "sort", "key", findings),
         };
         stages.insert(item.name.to_owned(), stage);
     }

@@ -8,8 +8,8 @@ use crate::diagnostic::Diagnostic;
 use crate::source::Spanned;
 
 /// Keys of `[schedule]`.
-pub const KEYS: [&str; 10] =
-    ["fuse", "queue", "order", "workgroup", "load", "until", "regenerate", "accumulate", "batch", "capacity"];
+pub const KEYS: [&str; 11] =
+    ["fuse", "queue", "order", "sort", "workgroup", "load", "until", "regenerate", "accumulate", "batch", "capacity"];
 /// Keys of `[precision]`.
 pub const PRECISION_KEYS: [&str; 1] = ["real"];
 
@@ -18,6 +18,9 @@ const MOST_CAPACITY: f64 = 1000.0;
 
 /// Paths that a slot takes in a pass at most: 32-bit counters of rays must survive it.
 const MOST_REGENERATED: u32 = 16;
+
+/// What `sort` says where no queue is sorted.
+const UNSORTED: &str = "none";
 
 const WORKGROUPS: [u32; 6] = [32, 64, 128, 256, 512, 1024];
 
@@ -36,6 +39,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
     let load = section.get("load").and_then(|item| item.word(&["entry", "use"], findings));
     let order = section.get("order").and_then(|item| item.word(&["arrival", "slot"], findings));
+    let sort = section.get("sort").and_then(|item| keys(&item, findings));
     let regenerate = match section.get("regenerate") {
         Some(item) => {
             let value = item.integer(1..=MOST_REGENERATED, findings);
@@ -52,6 +56,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         fuse: fuse?,
         queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup, QueueKind::None][queue?],
         order: [PathOrder::Arrival, PathOrder::Slot][order.unwrap_or_default()],
+        sort: sort.unwrap_or_default(),
         workgroup: workgroup?,
         load: [LoadAt::Entry, LoadAt::Use][load.unwrap_or_default()],
         regenerate: regenerate?,
@@ -117,6 +122,14 @@ fn room(item: &Item<'_>, findings: &mut Findings) -> Option<Spanned<f64>> {
         .help(format!("write a number above 0, and at most {MOST_CAPACITY}: records per path slot"));
     findings.push(refused);
     None
+}
+
+/// Keys of stages, or the word for none.
+fn keys(item: &Item<'_>, findings: &mut Findings) -> Option<Vec<Spanned<String>>> {
+    match &item.node.data {
+        Data::Text(text) if text == UNSORTED => Some(Vec::new()),
+        _ => names(item, findings),
+    }
 }
 
 /// A list of names; one name alone is a list of one, which spares quotes in `--set batch=connection`.

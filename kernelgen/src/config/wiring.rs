@@ -2,7 +2,9 @@
 
 use super::encode;
 use super::expression;
-use super::model::{Field, Fuse, Layers, Layout, OPTIONAL, Pipeline, Placed, PlacedField, Tally, Variant};
+use super::model::{
+    Field, Fuse, Layers, Layout, OPTIONAL, Pipeline, Placed, PlacedField, QueueKind, Schedule, Tally, Variant,
+};
 use super::section::Findings;
 use super::suggest;
 use crate::diagnostic::Diagnostic;
@@ -26,6 +28,7 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
         check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
     }
     check_groups(variant, findings);
+    check_keys(variant, findings);
     check_tables(&variant.layout, pipeline, findings);
     check_places(&variant.layout, pipeline, findings);
     encode::check(variant, findings);
@@ -83,6 +86,22 @@ fn check_groups(variant: &Variant, findings: &mut Findings) {
                 .help("name it in one group only; a group may have more than two stages");
             findings.push(twice);
         }
+    }
+}
+
+/// Keys that queues are sorted by: some stage declares each, and there are queues.
+fn check_keys(variant: &Variant, findings: &mut Findings) {
+    let Schedule { sort, queue, .. } = &variant.schedule;
+    let declared = variant.pipeline.stages.values().flat_map(|stage| &stage.sort);
+    let declared: IndexMap<String, Span> = declared.map(|(key, function)| (key.clone(), function.span)).collect();
+    for key in sort {
+        check_known(("K0228", "key"), key, &declared, findings);
+    }
+    if let (Some(key), QueueKind::None) = (sort.first(), queue) {
+        let unqueued = Diagnostic::error("K0229", format!("there is no queue to sort by `{}`", key.value))
+            .at(key.span, "with `queue = \"none\"` every kernel takes the paths of its own slots")
+            .help("write `sort = \"none\"`, or a `queue` of another kind");
+        findings.push(unqueued);
     }
 }
 

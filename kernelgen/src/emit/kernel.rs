@@ -259,6 +259,7 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "lane",
         "begun",
         "again",
+        "bin",
         "next",
         "round",
         "rays",

@@ -12,6 +12,7 @@ mod program;
 mod queue;
 mod room;
 mod signature;
+mod sort;
 mod stored;
 mod stream;
 mod tally;
@@ -91,6 +92,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     };
     let built = program::build(sources, &mut modules, &program)?;
     let facts = wiring.stages.iter().map(|(name, stage)| (name.as_str(), &stage.facts));
+    let keys = wiring.stages.iter().filter_map(|(name, stage)| Some((name.as_str(), &stage.key.as_ref()?.reads)));
     let mut effects_seen = built.effects_seen;
     effects_seen.extend(wiring.effects_seen.iter().cloned());
     let report = report::build(&report::Findings {
@@ -100,6 +102,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
         placement: &placement,
         liveness: &liveness,
         stages: facts.collect(),
+        keys: keys.collect(),
         effects_seen: &effects_seen,
     });
     debug_assert!(warnings.iter().all(|warning| warning.severity == Severity::Warning));
@@ -176,6 +179,7 @@ fn add_state_modules(
         ("control", queue::control_module(queues, rounds)),
         ("next", chain::module(wiring)),
         ("queue", queue::queue_module(queues)),
+        ("sort", sort::module(queues.workgroup)),
         ("tables", memory::module(placement)),
         ("stored", stored::module(&variant.pipeline, &placement.leaves)),
         ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule))),
@@ -190,7 +194,8 @@ fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
     let stages: Vec<String> = wiring.fusion.queued.keys().cloned().collect();
     let kind = variant.schedule.queue;
     let sorts = variant.schedule.order == PathOrder::Slot && kind != QueueKind::None;
-    let mixed = |stage: &&String| sorts && wiring.fusion.feeders(stage) > 1;
+    let has_key = |stage: &String| wiring.stages.get(stage).is_some_and(|stage| stage.key.is_some());
+    let mixed = |stage: &&String| sorts && wiring.fusion.feeders(stage) > 1 && !has_key(stage);
     Queues {
         ordered: stages.iter().filter(mixed).cloned().collect(),
         stages,
@@ -211,7 +216,8 @@ fn check_initialised(wiring: &Wiring, liveness: &Liveness, start: &str) -> Resul
 fn uninitialised(wiring: &Wiring, leaf: &Leaf, start: &str) -> Diagnostic {
     let mut finding = Diagnostic::error("K0210", format!("`{leaf}` can be read before it was ever written"));
     let mut reading = wiring.stages.iter().filter_map(|(name, stage)| {
-        let place = stage.facts.reads.get(leaf)?;
+        let key = stage.key.as_ref().and_then(|key| key.reads.get(leaf));
+        let place = stage.facts.reads.get(leaf).or(key)?;
         Some((name, *place))
     });
     if let Some((name, place)) = reading.next() {

@@ -7,10 +7,11 @@ use super::kernel::{self, Frame, Source};
 use super::memory::{self, Access};
 use super::queue::{self, Queues};
 use super::room;
+use super::sort;
 use super::stream;
 use super::tally;
-use super::wiring::Wiring;
-use crate::analyze::{self, Liveness};
+use super::wiring::{WiredKey, Wiring};
+use crate::analyze::{self, KernelTraffic, Liveness};
 use crate::config::model::{Accumulate, LoadAt, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
 use crate::layout::Placement;
@@ -50,8 +51,15 @@ pub(super) fn build(
     modules: &mut Modules,
     program: &Program<'_>,
 ) -> Result<Built, Vec<Diagnostic>> {
-    let mut builder =
-        Builder { sources, modules, program, kernels: Vec::new(), effects_seen: BTreeSet::new(), findings: Vec::new() };
+    let mut builder = Builder {
+        sources,
+        modules,
+        program,
+        kernels: Vec::new(),
+        effects_seen: BTreeSet::new(),
+        findings: Vec::new(),
+        sum_keys: None,
+    };
     let steps = builder.steps();
     if builder.findings.is_empty() { Ok(builder.finish(steps)) } else { Err(builder.findings) }
 }
@@ -63,6 +71,8 @@ struct Builder<'a> {
     kernels: Vec<(Kernel, Vec<LinkedBinding>)>,
     effects_seen: BTreeSet<String>,
     findings: Vec<Diagnostic>,
+    /// The kernel that all sorted queues share.
+    sum_keys: Option<usize>,
 }
 
 /// A kernel before it is linked.
@@ -126,9 +136,7 @@ impl Builder<'_> {
             self.prepare(&name, &prepared, &mut body);
             body.extend(streams.into_iter().filter_map(|stream| consumers.get(stream)).cloned());
             for stage in group {
-                if queues.is_ordered(&stage) {
-                    body.push(self.order(&stage));
-                }
+                body.extend(self.put_in_order(&stage));
                 let kernel = self.stages(&self.program.wiring.fusion.queued[&stage], Source::Queue);
                 body.push(Step::Indirect { kernel, slot: queues.of_stage(&stage).unwrap_or_default() });
             }
@@ -187,6 +195,52 @@ impl Builder<'_> {
         let text = housekeeping::prepare_kernel(name, body.is_empty(), prepared);
         let kernel = self.housekeeping(name, text, 1);
         body.push(Step::Single { kernel });
+    }
+
+    /// The steps that put the paths which wait for a stage in order, if the schedule asks for one.
+    fn put_in_order(&mut self, stage: &str) -> Vec<Step> {
+        let Program { wiring, queues, .. } = self.program;
+        match &wiring.stages[stage].key {
+            Some(key) => self.sort(stage, key),
+            None if queues.is_ordered(stage) => vec![self.order(stage)],
+            None => Vec::new(),
+        }
+    }
+
+    /// Sorts the paths that wait for a stage by its key, by counting.
+    fn sort(&mut self, stage: &str, key: &WiredKey) -> Vec<Step> {
+        let slot = self.program.queues.of_stage(stage).unwrap_or_default();
+        let count = self.count_keys(stage, key);
+        let sum = self.sum_keys();
+        let name = format!("sort_{stage}");
+        let workgroup = self.program.queues.workgroup;
+        let sort = self.housekeeping(&name, sort::sort_kernel(&name, stage, workgroup), workgroup);
+        vec![
+            Step::Indirect { kernel: count, slot },
+            Step::Single { kernel: sum },
+            Step::Indirect { kernel: sort, slot },
+        ]
+    }
+
+    /// The kernel that computes keys loads what they depend on, and nothing else.
+    fn count_keys(&mut self, stage: &str, key: &WiredKey) -> usize {
+        let Program { queues, placement, .. } = *self.program;
+        let name = format!("count_keys_{stage}");
+        let traffic = KernelTraffic { loads: key.reads.keys().cloned().collect(), ..KernelTraffic::default() };
+        let access = memory::access(placement, &traffic, &BTreeMap::new());
+        let frame = Frame { kernel: &name, entry: stage, source: Source::Queue, queues, access: &access, next: None };
+        let text = sort::count_kernel(frame, key);
+        let (workgroup, load_bytes) = (queues.workgroup, access.load_bytes);
+        self.compile(Draft { name, text, workgroup, load_bytes, ..Draft::default() })
+    }
+
+    fn sum_keys(&mut self) -> usize {
+        if let Some(kernel) = self.sum_keys {
+            return kernel;
+        }
+        let kernel = self.housekeeping("sum_keys", sort::sum_kernel("sum_keys"), sort::BINS);
+        self.sum_keys = Some(kernel);
+        kernel
     }
 
     /// Puts the paths that wait for a stage in the order of their slots.
@@ -374,6 +428,8 @@ impl Builder<'_> {
             buffer("queue", Role::Queue, per_path(4 * program.queues.stages.len() as u32)),
             buffer("waits_for", Role::Queue, per_path(4)),
             buffer("path_numbers", Role::Queue, per_path(4)),
+            buffer("keyed_paths", Role::Queue, per_path(8)),
+            buffer("key_bins", Role::Queue, fixed(2 * 4 * sort::BINS)),
             buffer("control", Role::Control, fixed(4 * program.queues.control_words())),
             buffer("arguments", Role::Arguments, fixed(12 * program.queues.count().max(1))),
         ]);

@@ -345,6 +345,103 @@ fn paths_that_come_from_one_stage_are_not_put_in_order() {
     }
 }
 
+/// Both stages declare keys, which read what nobody else does: the primitive of the hit.
+fn with_keys(set: &[(&str, &str)], key: &str) -> Result<Generated, Refusal> {
+    let pipeline = PIPELINE
+        .replace("rays = \"walk\", on", "rays = \"walk\", sort.pole = \"pole_key\", on")
+        .replace(
+            "shade = { on",
+            "shade = { with.walk = \"eye\", sort.prim = \"prim_key\", sort.pole = \"pole_key\", on",
+        )
+        .replace("on.miss = \"end\"", "on.miss = \"emit\"");
+    let functions = format!(
+        "{STAGES}\nfn prim_key(walk: ptr<function, Walk>) -> u32 {{ {key} }}\n\
+         fn pole_key(walk: ptr<function, Walk>) -> u32 {{ return u32(walk.direction.z > 0.0); }}\n"
+    );
+    crate::generate(&sources(&pipeline, LAYOUT, &functions), &selection(set))
+}
+
+fn sorted(set: &[(&str, &str)]) -> Generated {
+    with_keys(set, "return walk.hit.prim;").unwrap_or_else(|refusal| panic!("{set:?}\n{}", refusal.render(false)))
+}
+
+#[test]
+fn a_queue_is_sorted_by_the_key_of_its_stage() {
+    let Generated { plan, report, .. } = sorted(&[("schedule.sort", "prim"), ("schedule.order", "slot")]);
+    let Some(Step::Loop { body, .. }) = plan.program.get(2) else { panic!("{:?}", plan.program) };
+    let expected = ["prepare_shade", "resolve_connection", "count_keys_shade", "sum_keys", "sort_shade", "shade"];
+    let names = names(&plan, body);
+    assert_eq!(names[names.len() - 6..], expected);
+    assert!(names.contains(&"order_trace") && !names.contains(&"order_shade"), "{names:?}");
+    let count = kernel(&plan, "count_keys_shade");
+    assert!(count.module.contains("bin = prim_key(&eye) % BINS;"), "{}", count.module);
+    assert_eq!((count.load_bytes, count.store_bytes, count.rays), (4, 0, None), "one word holds the primitive");
+    assert!(!kernel(&plan, "shade").module.contains("eye.hit.prim ="), "only the key needs it");
+    assert!(report.dead.iter().all(|dead| dead.name != "eye.hit.prim"), "{:?}", report.dead);
+    let unsorted = sorted(&[]).report.dead;
+    assert!(unsorted.iter().any(|dead| dead.name == "eye.hit.prim"), "without the key nobody reads it: {unsorted:?}");
+}
+
+/// The key wins over the order of slots, and kernels that the queue is fed by do not wait for that.
+#[test]
+fn a_sorted_queue_is_not_put_in_order_of_slots() {
+    let plan = sorted(&[("schedule.sort", "pole"), ("schedule.order", "slot")]).plan;
+    let Some(Step::Loop { body, .. }) = plan.program.get(2) else { panic!("{:?}", plan.program) };
+    let names = names(&plan, body);
+    let steps = ["count_keys_trace", "sum_keys", "sort_trace", "trace"];
+    assert!(names.windows(4).any(|window| window == steps), "{names:?}");
+    assert!(kernel(&plan, "shade").module.contains("enqueue(QUEUE_TRACE,"));
+    assert!(plan.kernels.iter().all(|kernel| !kernel.module.contains("waits_for")));
+}
+
+/// Of several keys that a stage declares, the schedule's first.
+#[test]
+fn the_first_key_of_a_list_counts() {
+    for (list, function) in [("[\"prim\", \"pole\"]", "prim_key"), ("[\"pole\", \"prim\"]", "pole_key")] {
+        let plan = sorted(&[("schedule.sort", list)]).plan;
+        assert!(kernel(&plan, "count_keys_shade").module.contains(&format!("bin = {function}(&eye)")), "{list}");
+        assert!(kernel(&plan, "count_keys_trace").module.contains("bin = pole_key(&eye)"), "{list}");
+        assert_eq!(plan.kernels.iter().filter(|kernel| kernel.name == "sum_keys").count(), 1, "shared");
+    }
+}
+
+#[test]
+fn what_is_not_sorted_has_no_trace_of_keys() {
+    let fused = ("schedule.fuse", r#"[["trace", "shade"]]"#);
+    let inline = ("schedule.batch", "[]");
+    for set in [&[][..], &[("schedule.sort", "none")], &[("schedule.sort", "prim"), fused, inline]] {
+        let plan = sorted(set).plan;
+        assert!(plan.kernels.iter().all(|kernel| !kernel.module.contains("key_bins")), "{set:?}");
+        assert!(plan.buffers.iter().all(|buffer| !buffer.name.starts_with("key")), "{set:?}");
+    }
+    let plan = sorted(&[("schedule.sort", "pole"), fused, inline]).plan;
+    assert_eq!(
+        kernel(&plan, "count_keys_trace").load_bytes,
+        16,
+        "the entry of a fused kernel: the lane of `direction`"
+    );
+}
+
+#[test]
+fn wrong_keys_are_refused() {
+    let sort = ("schedule.sort", "prim");
+    let key = "return walk.hit.prim;";
+    for (code, set, key) in [
+        ("K0228", &[("schedule.sort", "prin")][..], key),
+        ("K0229", &[sort, ("schedule.queue", "none")], key),
+        ("K0230", &[sort], "walk.scratch = 1.0; return walk.hit.prim;"),
+        ("K0230", &[sort], "splat(0u, walk.throughput); return 0u;"),
+        ("K0310", &[sort], "return 1.0;"),
+    ] {
+        let text = with_keys(set, key).expect_err(code).render(false);
+        assert!(text.contains(code), "{code} not in\n{text}");
+    }
+    let nearest = with_keys(&[("schedule.sort", "prin")], key).expect_err("no such key").render(false);
+    assert!(nearest.contains("did you mean `prim`?"), "{nearest}");
+    refused("K0208", "shade = { on", "shade = { sort.prim = \"prim_key\", on");
+    refused("K0220", "shade = { on", "shade = { with.walk = \"eye\", on");
+}
+
 /// The schedule that fuses these groups, with inline visibility.
 fn fused(fuse: &str) -> Generated {
     generated(&[("schedule.fuse", fuse), ("schedule.batch", "[]")])

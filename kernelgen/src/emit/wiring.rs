@@ -11,7 +11,7 @@ use crate::diagnostic::Diagnostic;
 use crate::layout::StateLeaf;
 use crate::link::{self, Constant, Constants, Modules, Root};
 use crate::plan::SLOT_GRAIN;
-use crate::source::Sources;
+use crate::source::{Sources, Span, Spanned};
 use indexmap::{IndexMap, IndexSet};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -54,6 +54,18 @@ pub(super) struct WiredStage {
     pub rays: Option<RayKind>,
     /// Whether it counts something in a tally.
     pub counts: bool,
+    /// What the paths that wait for it are sorted by.
+    pub key: Option<WiredKey>,
+}
+
+/// The key of the paths that wait for a stage.
+#[derive(Clone, Debug)]
+pub(super) struct WiredKey {
+    pub entry: Entry,
+    /// The instance of each parameter, and its record.
+    pub instances: Vec<(String, String)>,
+    /// Leaves it reads, with one place where.
+    pub reads: BTreeMap<Leaf, Span>,
 }
 
 /// A stream with its consumer.
@@ -80,7 +92,8 @@ impl Wiring {
                 (target.to_owned(), stage.facts.written_with(outcomes.iter().map(|outcome| outcome.to_lowercase())))
             });
             let traces = stage.rays == Some(RayKind::Walk);
-            (name.clone(), FlowStage { facts: stage.facts.clone(), next: next.collect(), traces })
+            let key = stage.key.iter().flat_map(|key| key.reads.clone()).collect();
+            (name.clone(), FlowStage { facts: stage.facts.clone(), key, next: next.collect(), traces })
         };
         Flow { stages: self.stages.iter().map(stage).collect(), kernels: self.fusion.kernels(self.stages.keys()) }
     }
@@ -120,7 +133,7 @@ impl WiredStage {
 /// is no stage, K0217 pushes to a batched stream in a loop, K0219 two parameters for one instance, K0220 an instance for a parameter
 /// that is not there, K0221 a consumer that takes something else than one record, K0222 a batched
 /// stream without room for a round, K0226 pushes to a batched stream in a loop of fused stages, K0227 slots that
-/// would take new paths in the kernel that begins them; K03xx of the stage texts.
+/// would take new paths in the kernel that begins them, K0230 a key function that does more than compute a key; K03xx of the stage texts.
 /// Warnings: K0204 an outcome that never comes, K0205 a stage that nothing reaches.
 pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Diagnostic>> {
     let mut wirer = Wirer {
@@ -135,6 +148,7 @@ pub(super) fn wire(texts: Texts<'_>, variant: &Variant) -> Result<Wiring, Vec<Di
     wirer.keep_reached(&reached);
     let start = &variant.pipeline.start.value;
     wirer.wiring.fusion = Fusion::new(&wirer.wiring.stages, start, &variant.schedule);
+    wirer.drop_keys_without_queues();
     wirer.check_regeneration();
     wirer.wire_streams();
     if wirer.findings.is_empty() { Ok(wirer.wiring) } else { Err(distinct(wirer.findings)) }
@@ -245,17 +259,20 @@ impl Wirer<'_> {
     }
 
     fn wire_stage(&mut self, name: &str, stage: &Stage) -> Result<WiredStage, Vec<Diagnostic>> {
-        let pipeline = &self.variant.pipeline;
-        let instance_of = |param: &str| match stage.with.get(param) {
-            Some(instance) => Some(instance.value.clone()),
-            None => pipeline.state.contains_key(param).then(|| param.to_owned()),
-        };
         let entry = self.entries.find(&stage.entry).map_err(|finding| vec![finding])?.clone();
+        let key_params = self.key_params(stage)?;
         let (texts, variant) = (self.texts, self.variant);
+        let outcomes = texts.outcomes.iter().zip(0..).map(|(name, value)| (value, name.clone())).collect();
         let analysed = self.analyse(
             entry,
-            |entry, signature| check_stage_signature(variant, name, stage, entry, signature, texts),
-            &instance_of,
+            |entry, signature| {
+                let mut findings = check_parameters(variant, name, stage, entry, signature);
+                findings.extend(check_with(name, stage, entry, signature, &key_params));
+                findings.extend(check_returns_outcome(entry, signature, texts));
+                findings
+            },
+            &|param| instance_of(variant, stage, param),
+            Some(&outcomes),
         )?;
         self.check_outcomes(name, stage, &analysed)?;
         let routes = analysed.facts.outcomes.keys().filter_map(|outcome| {
@@ -265,13 +282,9 @@ impl Wirer<'_> {
         let order = |(outcome, _): &(String, String)| stage.on.get_index_of(outcome);
         let mut routes: Vec<(String, String)> = routes.collect();
         routes.sort_by_key(order);
-        let instances = analysed.signature.params.iter().filter_map(|(param, _)| {
-            let instance = instance_of(param)?;
-            let record = pipeline.state.get(&instance)?.value.clone();
-            Some((instance, record))
-        });
         Ok(WiredStage {
-            instances: instances.collect(),
+            instances: instances(variant, stage, &analysed.signature),
+            key: self.wire_key(name, stage)?,
             entry: analysed.entry,
             facts: analysed.facts,
             routes,
@@ -280,12 +293,52 @@ impl Wirer<'_> {
         })
     }
 
+    /// Parameters of all key functions of a stage, whether the schedule asks for these keys or not.
+    fn key_params(&self, stage: &Stage) -> Result<BTreeSet<String>, Vec<Diagnostic>> {
+        let mut params = BTreeSet::new();
+        for function in stage.sort.values() {
+            let entry = self.entries.find(function).map_err(|finding| vec![finding])?;
+            params.extend(entry.params.keys().cloned());
+        }
+        Ok(params)
+    }
+
+    /// The first key of the schedule that the stage declares.
+    fn wire_key(&mut self, name: &str, stage: &Stage) -> Result<Option<WiredKey>, Vec<Diagnostic>> {
+        let variant = self.variant;
+        let mut asked = variant.schedule.sort.iter().filter_map(|key| stage.sort.get(&key.value));
+        let Some(function) = asked.next() else { return Ok(None) };
+        let entry = self.entries.find(function).map_err(|finding| vec![finding])?.clone();
+        let analysed = self.analyse(
+            entry,
+            |entry, signature| {
+                let mut findings = check_parameters(variant, name, stage, entry, signature);
+                findings.extend(check_returns_key(function, entry, signature));
+                findings
+            },
+            &|param| instance_of(variant, stage, param),
+            None,
+        )?;
+        check_key(function, &analysed)?;
+        let instances = instances(variant, stage, &analysed.signature);
+        Ok(Some(WiredKey { entry: analysed.entry, instances, reads: analysed.facts.reads }))
+    }
+
+    /// A stage that paths only come to inside a kernel has nothing to sort.
+    fn drop_keys_without_queues(&mut self) {
+        let Wiring { stages, fusion, .. } = &mut self.wiring;
+        for (_, stage) in stages.iter_mut().filter(|(name, _)| !fusion.queued.contains_key(*name)) {
+            stage.key = None;
+        }
+    }
+
     /// Links and parses a function, checks its signature, then finds its facts.
     fn analyse(
         &mut self,
         entry: Entry,
         check: impl Fn(&Entry, &Signature) -> Vec<Diagnostic>,
         bind: &dyn Fn(&str) -> Option<String>,
+        outcomes: Option<&BTreeMap<u32, String>>,
     ) -> Result<Analysed, Vec<Diagnostic>> {
         let texts = self.texts;
         let root = Root { module: &entry.module, item: &entry.name };
@@ -296,8 +349,7 @@ impl Wirer<'_> {
         if !findings.is_empty() {
             return Err(findings);
         }
-        let outcomes = texts.outcomes.iter().zip(0..).map(|(name, value)| (value, name.clone()));
-        let facts = analyze::stage_facts(&module, &linked, &entry.name, bind, &outcomes.collect())?;
+        let facts = analyze::stage_facts(&module, &linked, &entry.name, bind, outcomes)?;
         let pruned = linked.constants_seen.iter().any(|name| self.is_absent(name));
         self.wiring.effects_seen.extend(linked.constants_seen);
         let counts = linked.items.iter().any(|(module, item)| module == "tallies" && item.starts_with("count_"));
@@ -383,8 +435,8 @@ impl Wirer<'_> {
         let batched = variant.schedule.batch.iter().any(|batch| batch.value == name);
         let entry = self.entries.find(&stream.consumer).map_err(|finding| vec![finding])?.clone();
         let bind = |_: &str| Some(name.to_owned());
-        let analysed =
-            self.analyse(entry, |entry, signature| check_consumer_signature(name, stream, entry, signature), &bind)?;
+        let check = |entry: &Entry, signature: &Signature| check_consumer_signature(name, stream, entry, signature);
+        let analysed = self.analyse(entry, check, &bind, None)?;
         check_consumer(name, stream, &analysed)?;
         let pushes = if batched { self.pushes(name)? } else { IndexMap::new() };
         let most = room::most(&self.wiring.fusion, &pushes);
@@ -483,13 +535,31 @@ fn read_leaves(variant: &Variant, name: &str, stream: &Stream, facts: &StageFact
     leaves.filter(|leaf| facts.reads.contains_key(&leaf.leaf)).collect()
 }
 
-fn check_stage_signature(
+/// The instance that a parameter of a stage or of its key stands for.
+fn instance_of(variant: &Variant, stage: &Stage, param: &str) -> Option<String> {
+    match stage.with.get(param) {
+        Some(instance) => Some(instance.value.clone()),
+        None => variant.pipeline.state.contains_key(param).then(|| param.to_owned()),
+    }
+}
+
+/// The instance of each parameter, and its record.
+fn instances(variant: &Variant, stage: &Stage, signature: &Signature) -> Vec<(String, String)> {
+    let instances = signature.params.iter().filter_map(|(param, _)| {
+        let instance = instance_of(variant, stage, param)?;
+        let record = variant.pipeline.state.get(&instance)?.value.clone();
+        Some((instance, record))
+    });
+    instances.collect()
+}
+
+/// Every parameter of a stage function, or of a key function of the stage, takes an instance of its own.
+fn check_parameters(
     variant: &Variant,
     name: &str,
     stage: &Stage,
     entry: &Entry,
     signature: &Signature,
-    texts: Texts<'_>,
 ) -> Vec<Diagnostic> {
     let pipeline = &variant.pipeline;
     let place = |param: &str| entry.params.get(param).copied().unwrap_or(entry.span);
@@ -525,7 +595,19 @@ fn check_stage_signature(
             );
         }
     }
-    for (param, instance) in &stage.with {
+    findings
+}
+
+/// Whatever `with` names is a parameter of the stage function or of a key function.
+fn check_with(
+    name: &str,
+    stage: &Stage,
+    entry: &Entry,
+    signature: &Signature,
+    key_params: &BTreeSet<String>,
+) -> Vec<Diagnostic> {
+    let mut findings = Vec::new();
+    for (param, instance) in stage.with.iter().filter(|(param, _)| !key_params.contains(*param)) {
         if !signature.params.iter().any(|(name, _)| name == param) {
             let names = signature.params.iter().map(|(name, _)| name.as_str());
             let help = match nearest(param, names.clone()) {
@@ -541,6 +623,11 @@ fn check_stage_signature(
             );
         }
     }
+    findings
+}
+
+fn check_returns_outcome(entry: &Entry, signature: &Signature, texts: Texts<'_>) -> Vec<Diagnostic> {
+    let mut findings = Vec::new();
     if !signature.returns_u32 {
         let outcomes: Vec<String> = texts.outcomes.iter().map(|name| name.to_uppercase()).collect();
         let message = format!("stage function `{}` must return an outcome, a `u32`", entry.name);
@@ -553,14 +640,34 @@ fn check_stage_signature(
     findings
 }
 
-fn no_instance(
-    variant: &Variant,
-    name: &str,
-    stage: &Stage,
-    param: &str,
-    bound: &str,
-    place: crate::source::Span,
-) -> Diagnostic {
+fn check_returns_key(function: &Spanned<String>, entry: &Entry, signature: &Signature) -> Option<Diagnostic> {
+    let returned = Diagnostic::error("K0215", format!("key function `{}` must return a `u32`", entry.name))
+        .at(entry.span, "should end in `-> u32`")
+        .also(function.span, "wired here")
+        .help("return the number of a bin: paths with equal numbers come together");
+    (!signature.returns_u32).then_some(returned)
+}
+
+/// K0230: a key may be computed as often as the schedule likes, or never.
+fn check_key(function: &Spanned<String>, analysed: &Analysed) -> Result<(), Vec<Diagnostic>> {
+    let facts = &analysed.facts;
+    let written = facts.writes.iter().chain(&facts.maybe).next();
+    let (place, what) = match written {
+        Some((leaf, place)) => (*place, format!("writes `{leaf}`")),
+        None if !facts.pushes.is_empty() => (analysed.entry.span, "pushes to a stream".to_owned()),
+        None if analysed.counts => (analysed.entry.span, "counts in a tally".to_owned()),
+        None if facts.globals.contains("film") => (analysed.entry.span, "adds to the film".to_owned()),
+        None => return Ok(()),
+    };
+    Err(vec![
+        Diagnostic::error("K0230", format!("key function `{}` does more than compute a key", analysed.entry.name))
+            .at(place, what)
+            .also(function.span, "wired here")
+            .help("only read: whether a queue is sorted must not change the image"),
+    ])
+}
+
+fn no_instance(variant: &Variant, name: &str, stage: &Stage, param: &str, bound: &str, place: Span) -> Diagnostic {
     let names = || variant.pipeline.state.keys().map(String::as_str);
     let help = match nearest(bound, names()) {
         Some(near) => format!("add `with.{param} = \"{near}\"`"),
