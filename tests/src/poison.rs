@@ -11,6 +11,14 @@ pub fn poison(plan: &mut Plan) {
     }
 }
 
+/// Takes a load out of all kernels: lines that begin so, `eye.throughput = bitcast`.
+pub fn forget(plan: &mut Plan, load: &str) {
+    for kernel in &mut plan.kernels {
+        let kept = kernel.module.lines().filter(|line| !line.trim_start().starts_with(load));
+        kernel.module = kept.map(|line| format!("{line}\n")).collect();
+    }
+}
+
 fn poisoned(module: &str) -> String {
     let structs = structs(module);
     let mut text = String::new();

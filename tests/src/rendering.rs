@@ -1,6 +1,6 @@
 //! Renders scenes for tests, two at a time, on the best adapter of the machine: Mesa's software driver in CI.
 
-use crate::poison::poison;
+use crate::poison::{forget, poison};
 use crate::scene_builder::SceneBuilder;
 use crate::sky::Sky;
 use crate::statistics::Pixels;
@@ -56,6 +56,7 @@ pub struct Job {
     samples: u32,
     seed: u32,
     poisoned: bool,
+    forgotten: Option<String>,
     probe: Option<fn(&mut Plan)>,
     paths: Option<u32>,
 }
@@ -91,6 +92,7 @@ impl Job {
             samples: 64,
             seed: 1,
             poisoned: false,
+            forgotten: None,
             probe: None,
             paths: None,
         }
@@ -182,6 +184,12 @@ impl Job {
         self
     }
 
+    /// Kernels lack a load: the lines that begin so.
+    pub fn forgetting(mut self, load: &str) -> Job {
+        self.forgotten = Some(load.into());
+        self
+    }
+
     /// Path slots.
     pub fn paths(mut self, paths: u32) -> Job {
         self.paths = Some(paths);
@@ -211,6 +219,9 @@ impl Job {
         let mut plan = self.generate(&scene).unwrap_or_else(|refusal| panic!("{refusal}")).plan;
         if self.poisoned {
             poison(&mut plan);
+        }
+        if let Some(load) = &self.forgotten {
+            forget(&mut plan, load);
         }
         if let Some(probe) = self.probe {
             probe(&mut plan);

@@ -21,6 +21,18 @@ fn garbage_in_what_is_not_loaded_changes_nothing() {
     }
 }
 
+/// The test above would see it if a kernel did not load a field that it uses.
+#[test]
+fn a_load_that_is_missing_is_noticed() {
+    let job =
+        Job::of_file(shipped("cornell_box")).pipeline("pt").layout("compact").size(24, 16).samples(2).fixed_point();
+    let clean = job.render();
+    for load in ["eye.throughput = bitcast", "eye.pdf_w = bitcast", "eye.hit.uv = bitcast"] {
+        let forgetting = job.clone().poisoned().forgetting(load).render();
+        assert!(forgetting.sums != clean.sums || forgetting.rejected > 0, "nobody missed `{load}`");
+    }
+}
+
 /// Programs of random reads, writes and ways between stages, in random tables, orders, lanes and codecs.
 #[test]
 fn random_programs_do_the_same_in_shared_words() {

@@ -157,10 +157,11 @@ impl Writer<'_> {
             None => {}
         }
         if stage.routes.is_empty() {
-            let _ = writeln!(text, "{indent}_ = {};\n{indent}next = NEXT_END;", call(stage));
+            let _ =
+                writeln!(text, "{indent}_ = {};\n{indent}next = NEXT_END;", call(&stage.entry.name, &stage.instances));
             return text;
         }
-        let _ = writeln!(text, "{indent}switch {} {{", call(stage));
+        let _ = writeln!(text, "{indent}switch {} {{", call(&stage.entry.name, &stage.instances));
         for (target, outcomes) in stage.outcomes_by_target() {
             self.imports.add("outcome", outcomes.iter().map(String::as_str));
             let next = self.constant(target);

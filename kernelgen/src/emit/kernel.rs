@@ -68,7 +68,7 @@ pub(super) fn stage_kernel(frame: Frame<'_>, stage: &WiredStage) -> String {
         filling.locals = "    var outcome = END;\n".to_owned();
         result = "outcome";
     }
-    filling.body = format!("        {result} = {};\n", call(stage));
+    filling.body = format!("        {result} = {};\n", call(&stage.entry.name, &stage.instances));
     frame.fill(filling)
 }
 
@@ -167,10 +167,10 @@ fn loaded(instances: &IndexMap<String, String>, access: &Access, imports: &mut I
     text
 }
 
-/// The call of a stage function.
-pub(super) fn call(stage: &WiredStage) -> String {
-    let arguments: Vec<String> = stage.instances.iter().map(|(instance, _)| format!("&{instance}")).collect();
-    format!("{}({})", stage.entry.name, arguments.join(", "))
+/// The call of a function of instances.
+pub(super) fn call(function: &str, instances: &[(String, String)]) -> String {
+    let arguments: Vec<String> = instances.iter().map(|(instance, _)| format!("&{instance}")).collect();
+    format!("{function}({})", arguments.join(", "))
 }
 
 /// Constants of the outcomes that lead somewhere.

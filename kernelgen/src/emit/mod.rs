@@ -1,6 +1,7 @@
 //! The generator's last step: modules and kernels as text, the plan, the report.
 
 mod chain;
+mod contract;
 mod entry;
 mod film;
 mod fusion;

@@ -4,7 +4,7 @@
 //! `count_keys_X` computes the key of every path that waits for stage X, notes path and key, and counts each key; `sum_keys` turns counts
 //! into the places where keys begin; `sort_X` writes the paths back into the queue. Paths of equal keys come in any order.
 
-use super::kernel::{Filling, Frame};
+use super::kernel::{Filling, Frame, call};
 use super::text::{Imports, PARAMETERS, stage_constant};
 use super::wiring::WiredKey;
 
@@ -20,8 +20,7 @@ pub(super) fn count_kernel(frame: Frame<'_>, key: &WiredKey) -> String {
         end: "\n    count_key(bin, path_id, index, lane);\n".to_owned(),
         ..Filling::default()
     };
-    let arguments: Vec<String> = key.instances.iter().map(|(instance, _)| format!("&{instance}")).collect();
-    filling.body = format!("        bin = {}({}) % BINS;\n", key.entry.name, arguments.join(", "));
+    filling.body = format!("        bin = {} % BINS;\n", call(&key.entry.name, &key.instances));
     filling.imports.add(&key.entry.module, [key.entry.name.as_str()]);
     filling.imports.add("sort", ["BINS", "NO_BIN", "count_key"]);
     frame.fill(filling)

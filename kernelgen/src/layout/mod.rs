@@ -12,7 +12,7 @@ mod tests;
 use crate::analyze::{Leaf, Liveness};
 use crate::config::model::{Codec, Layout, OPTIONAL, Order, Pipeline, Variant};
 use crate::config::nearest;
-use crate::config::quantity::LeafType;
+use crate::config::quantity::{LeafShape, LeafType};
 use crate::diagnostic::Diagnostic;
 use crate::source::Spanned;
 use indexmap::IndexMap;
@@ -82,6 +82,13 @@ pub struct StateLeaf {
 }
 
 impl StateLeaf {
+    /// A part of a field of an instance, kept as it is computed.
+    pub fn new(instance: &str, field: &str, shape: &LeafShape) -> Self {
+        let leaf =
+            Leaf { instance: instance.to_owned(), field: field.to_owned(), member: shape.member.map(str::to_owned) };
+        StateLeaf { leaf, ty: shape.ty, bits: shape.bits, quantity: shape.quantity, codec: None }
+    }
+
     /// Widths in bits of the parts that it is stored in, each within a word: those of its codec, or its components.
     pub fn parts(&self) -> Vec<u32> {
         match &self.codec {
@@ -152,17 +159,7 @@ pub fn state_leaves(pipeline: &Pipeline) -> Vec<StateLeaf> {
     for (instance, record) in &pipeline.state {
         let Some(record) = pipeline.records.get(&record.value) else { continue };
         for (field, declared) in &record.fields {
-            leaves.extend(declared.quantity.leaves().into_iter().map(|shape| StateLeaf {
-                leaf: Leaf {
-                    instance: instance.clone(),
-                    field: field.clone(),
-                    member: shape.member.map(str::to_owned),
-                },
-                ty: shape.ty,
-                bits: shape.bits,
-                quantity: shape.quantity,
-                codec: None,
-            }));
+            leaves.extend(declared.quantity.leaves().iter().map(|shape| StateLeaf::new(instance, field, shape)));
         }
     }
     leaves

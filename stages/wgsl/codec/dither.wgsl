@@ -2,18 +2,11 @@
 
 import package::real::vec3r;
 import package::pass::{pass_seed, path_number, path_sample};
+import package::random::{hash4, unit_interval4};
 
-/// Three numbers in [0, 1): a hash of the value, of the path and of its sample (pcg3d of Jarzynski and Olano 2020, "Hash Functions for
-/// GPU Rendering", JCGT 9(3)). They need no count of their uses, so every schedule rounds alike.
+/// Three numbers in [0, 1): a hash of the value, of the path and of its sample. They need no count of their uses, so every schedule
+/// rounds alike.
 fn dither3(value: vec3r) -> vec3r {
-    var v = bitcast<vec3u>(vec3f(value)) ^ vec3u(path_number(), path_sample() * 2654435769u, pass_seed());
-    v = v * 1664525u + 1013904223u;
-    v.x += v.y * v.z;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    v ^= v >> vec3u(16u);
-    v.x += v.y * v.z;
-    v.y += v.z * v.x;
-    v.z += v.x * v.y;
-    return vec3r(vec3f(v >> vec3u(8u)) * 5.9604644775390625e-8);
+    let key = vec4u(bitcast<vec3u>(vec3f(value)), pass_seed());
+    return unit_interval4(hash4(key ^ vec4u(path_number(), path_sample(), 0u, 0u))).xyz;
 }

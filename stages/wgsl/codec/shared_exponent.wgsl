@@ -39,6 +39,24 @@ fn join_exponent(mantissa: vec3u, width: u32, exponent: i32) -> vec3r {
     return ldexp(vec3r(mantissa), vec3i(exponent - i32(width)));
 }
 
+/// A spectrum in one word: three mantissas of `width` bits, behind them the exponent plus `bias`.
+fn pack_exponent(value: vec3r, width: u32, bias: i32, least: i32, greatest: i32) -> u32 {
+    let split = split_exponent(value, width, least, greatest);
+    let exponent = u32(split.exponent + bias) << (3u * width);
+    let bits = split.mantissa.x | (split.mantissa.y << width) | (split.mantissa.z << (2u * width)) | exponent;
+    // The brightest white must not look like what is no number.
+    return select(NO_SPECTRUM, min(bits, NO_SPECTRUM - 1u), split.valid);
+}
+
+/// The spectrum of such a word.
+fn unpack_exponent(bits: u32, width: u32, bias: i32) -> vec3r {
+    if bits == NO_SPECTRUM {
+        return no_spectrum();
+    }
+    let mantissa = (vec3u(bits) >> vec3u(0u, width, 2u * width)) & vec3u((1u << width) - 1u);
+    return join_exponent(mantissa, width, i32(bits >> (3u * width)) - bias);
+}
+
 /// What `NO_SPECTRUM` stands for.
 fn no_spectrum() -> vec3r {
     return bitcast<vec3f>(vec3u(0x7fc00000u));
