@@ -227,10 +227,10 @@ pub enum Step {
         /// Which triple of the arguments buffer.
         slot: u32,
     },
-    /// The body, this many times; empty queues make its dispatches empty.
+    /// The body again and again; empty queues make its dispatches empty.
     Loop {
-        /// How often.
-        rounds: u32,
+        /// How often: in the first, second, ... turn of the loop around it; the last number holds for all further ones.
+        turns: Vec<u32>,
         /// What.
         body: Vec<Step>,
     },

@@ -10,7 +10,7 @@ const DEFAULT_PATHS_GPU: u64 = 1 << 22;
 /// Path slots on a CPU adapter when not asked otherwise.
 const DEFAULT_PATHS_CPU: u64 = 1 << 17;
 /// The most that may be asked for: 32-bit ray counters must survive a pass of a thousand rounds.
-const MOST_PATHS: u64 = 1 << 22;
+const MOST_PATHS: u64 = 1 << 24;
 /// Slots come in multiples of this.
 const GRAIN: u64 = SLOT_GRAIN as u64;
 

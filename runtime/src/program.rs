@@ -29,7 +29,7 @@ pub enum Entries {
 pub struct Command {
     /// Index into `Plan::kernels`.
     pub kernel: usize,
-    /// Round of the outermost loop; 0 before it, the number of its rounds behind it.
+    /// Turns of innermost loops begun before it, its own left out; behind all loops the number of all.
     pub round: u32,
     /// How large it is.
     pub extent: Extent,
@@ -39,32 +39,50 @@ pub struct Command {
 
 /// Unrolls the loops of a plan's program.
 pub fn commands(plan: &Plan) -> Vec<Command> {
-    let mut program = Vec::new();
-    flatten(plan, &plan.program, None, &mut program);
-    program
+    let mut flattened = Flattened { plan, begun: 0, program: Vec::new() };
+    flattened.add(&plan.program, None);
+    flattened.program
 }
 
-fn flatten(plan: &Plan, steps: &[Step], round: Option<u32>, program: &mut Vec<Command>) {
-    let mut done = 0;
-    for step in steps {
-        let command =
-            |kernel: usize, extent, entries| Command { kernel, round: round.unwrap_or(done), extent, entries };
-        match step {
-            Step::Dispatch { kernel } => {
-                let works = plan.kernels.get(*kernel).is_some_and(|kernel| !kernel.stages.is_empty());
-                program.push(command(*kernel, Extent::Active, if works { Entries::Active } else { Entries::None }));
-            }
-            Step::Single { kernel } => program.push(command(*kernel, Extent::Single, Entries::None)),
-            Step::Indirect { kernel, slot } => {
-                let counted = Entries::Counted(u64::from(plan.entries.of_slot(*slot)) * 4);
-                program.push(command(*kernel, Extent::Indirect(u64::from(*slot) * 12), counted));
-            }
-            Step::Loop { rounds, body } => {
-                for index in 0..*rounds {
-                    flatten(plan, body, round.or(Some(index)), program);
+struct Flattened<'a> {
+    plan: &'a Plan,
+    /// Turns of innermost loops begun.
+    begun: u32,
+    program: Vec<Command>,
+}
+
+impl Flattened<'_> {
+    /// Adds steps, those of a loop's turn of this number if it is one.
+    fn add(&mut self, steps: &[Step], turn: Option<usize>) {
+        for step in steps {
+            match step {
+                Step::Dispatch { kernel } => {
+                    let works = self.plan.kernels.get(*kernel).is_some_and(|kernel| !kernel.stages.is_empty());
+                    let entries = if works { Entries::Active } else { Entries::None };
+                    self.push(turn, *kernel, Extent::Active, entries);
                 }
-                done = *rounds;
+                Step::Single { kernel } => self.push(turn, *kernel, Extent::Single, Entries::None),
+                Step::Indirect { kernel, slot } => {
+                    let counted = Entries::Counted(u64::from(self.plan.entries.of_slot(*slot)) * 4);
+                    self.push(turn, *kernel, Extent::Indirect(u64::from(*slot) * 12), counted);
+                }
+                Step::Loop { turns, body } => self.repeat(turns, body, turn.unwrap_or(0)),
             }
         }
+    }
+
+    /// Adds the turns of a loop inside a turn of this number.
+    fn repeat(&mut self, turns: &[u32], body: &[Step], around: usize) {
+        let innermost = !body.iter().any(|step| matches!(step, Step::Loop { .. }));
+        let count = turns.get(around).or(turns.last()).copied().unwrap_or(0);
+        for turn in 0..count {
+            self.begun += u32::from(innermost);
+            self.add(body, Some(turn as usize));
+        }
+    }
+
+    fn push(&mut self, turn: Option<usize>, kernel: usize, extent: Extent, entries: Entries) {
+        let round = if turn.is_some() { self.begun.saturating_sub(1) } else { self.begun };
+        self.program.push(Command { kernel, round, extent, entries });
     }
 }

@@ -1,6 +1,6 @@
 //! `rounds` and sizes: integer arithmetic over parameters.
 
-use super::model::{Param, ParamValue, Pipeline};
+use super::model::{Inner, Param, ParamValue, Pipeline};
 use super::suggest;
 use crate::diagnostic::Diagnostic;
 use crate::source::{Span, Spanned};
@@ -12,6 +12,20 @@ use indexmap::IndexMap;
 /// K0116 with the place inside the expression: syntax, an unknown or unfit parameter, a result outside of 1 to 2^32-1.
 pub fn evaluate_rounds(pipeline: &Pipeline) -> Result<u32, Diagnostic> {
     evaluate("rounds", &pipeline.rounds, &pipeline.params, u32::MAX)
+}
+
+/// Evaluates what a pipeline declares of its inner loop: its turns in every round, as many numbers as there are rounds then. In `turns`
+/// the number of the round is named `round`, the first 0.
+///
+/// # Errors
+/// K0116, as `evaluate_rounds`; there are 1000 rounds at most.
+pub fn evaluate_inner(pipeline: &Pipeline, inner: &Inner) -> Result<Vec<u32>, Diagnostic> {
+    let rounds = evaluate("rounds", &inner.rounds, &pipeline.params, MOST_ROUNDS)?;
+    let turns = |round| {
+        let mut reader = Reader { round: Some(round), ..Reader::new("turns", &inner.turns, &pipeline.params) };
+        reader.value(MOST_ROUNDS)
+    };
+    (0..rounds).map(turns).collect()
 }
 
 /// Evaluates the `size` of something that the pipeline declares, written as `rounds`.
@@ -39,14 +53,11 @@ fn evaluate(
     params: &IndexMap<String, Param>,
     most: u32,
 ) -> Result<u32, Diagnostic> {
-    let mut reader = Reader { key, text, rest: &text.value, params, used: Vec::new(), depth: 0 };
-    let value = reader.sum()?;
-    if reader.peek().is_some() {
-        return Err(reader.error("an operator or the end is missing here"));
-    }
-    let fitting = u32::try_from(value).ok().filter(|value| (1..=most).contains(value));
-    fitting.ok_or_else(|| reader.outside(value, most))
+    Reader::new(key, text, params).value(most)
 }
+
+/// Rounds of a pass at most: 32-bit counters of rays must survive it.
+pub const MOST_ROUNDS: u32 = 1000;
 
 /// Nesting beyond this is no round count but an attack on the stack.
 const MAX_DEPTH: u32 = 64;
@@ -60,9 +71,25 @@ struct Reader<'a> {
     /// Places of the parameters met, and what they are.
     used: Vec<(Span, String)>,
     depth: u32,
+    /// The value of `round`, where that is a name.
+    round: Option<u32>,
 }
 
 impl<'a> Reader<'a> {
+    fn new(key: &'static str, text: &'a Spanned<String>, params: &'a IndexMap<String, Param>) -> Self {
+        Reader { key, text, rest: &text.value, params, used: Vec::new(), depth: 0, round: None }
+    }
+
+    /// The whole expression, from 1 to `most`.
+    fn value(&mut self, most: u32) -> Result<u32, Diagnostic> {
+        let value = self.sum()?;
+        if self.peek().is_some() {
+            return Err(self.error("an operator or the end is missing here"));
+        }
+        let fitting = u32::try_from(value).ok().filter(|value| (1..=most).contains(value));
+        fitting.ok_or_else(|| self.outside(value, most))
+    }
+
     fn outside(&self, value: i64, most: u32) -> Diagnostic {
         let message = format!("`{}` comes to {value}", self.key);
         let mut diagnostic = Diagnostic::error("K0116", message).at(self.text.span, format!("this is {value}"));
@@ -135,6 +162,9 @@ impl<'a> Reader<'a> {
 
     fn parameter(&mut self) -> Result<i64, Diagnostic> {
         let name = self.word(|c| c.is_ascii_alphanumeric() || c == '_');
+        if let Some(round) = self.round.filter(|_| name == "round") {
+            return Ok(i64::from(round));
+        }
         match self.params.get(name) {
             Some(Param { value: ParamValue::U32(value), span, .. }) => {
                 self.used.push((*span, format!("`{name}` is {value} in this variant")));

@@ -20,7 +20,9 @@ pub struct Axis {
 pub const PIPELINE: Axis = Axis {
     noun: "pipeline",
     folder: "pipelines",
-    keys: &["start", "rounds", "params", "records", "state", "streams", "tallies", "layers", "stored", "stages"],
+    keys: &[
+        "start", "rounds", "inner", "params", "records", "state", "streams", "tallies", "layers", "stored", "stages",
+    ],
 };
 /// Where fields live.
 pub const LAYOUT: Axis = Axis { noun: "layout", folder: "layouts", keys: &["layout"] };

@@ -23,5 +23,5 @@ mod wiring;
 mod tests;
 
 pub use axis::load;
-pub use expression::{evaluate_rounds, evaluate_size};
+pub use expression::{MOST_ROUNDS, evaluate_inner, evaluate_rounds, evaluate_size};
 pub use suggest::nearest;

@@ -63,6 +63,8 @@ pub struct Pipeline {
     pub start: Spanned<String>,
     /// Upper bound of the rounds after which no path is alive: an arithmetic expression over integers and u32 parameters.
     pub rounds: Spanned<String>,
+    /// A loop inside the rounds.
+    pub inner: Option<Inner>,
     /// Parameters by name.
     pub params: IndexMap<String, Param>,
     /// Records by name.
@@ -80,6 +82,17 @@ pub struct Pipeline {
     pub stored: IndexMap<String, Spanned<String>>,
     /// Stages by name, in the order in which a round runs them.
     pub stages: IndexMap<String, Stage>,
+}
+
+/// A loop inside the rounds: a stage to which a later one leads back, several times a round.
+#[derive(Clone, Debug)]
+pub struct Inner {
+    /// The first stage of the loop.
+    pub stage: Spanned<String>,
+    /// Upper bound of its turns in a round: an expression as `rounds`, which may name the `round`, counted from 0.
+    pub turns: Spanned<String>,
+    /// Upper bound of the rounds that remain.
+    pub rounds: Spanned<String>,
 }
 
 /// A parameter: a constant in every kernel, set with `--set`.
@@ -310,6 +323,8 @@ pub struct Schedule {
     pub queue: QueueKind,
     /// In what order stages take their paths.
     pub order: PathOrder,
+    /// How kernels are repeated.
+    pub loops: Loops,
     /// Keys of stages by which paths are sorted before the stage takes them. Where a stage declares several, the first counts.
     pub sort: Vec<Spanned<String>>,
     /// Threads in a workgroup.
@@ -324,6 +339,17 @@ pub struct Schedule {
     pub batch: Vec<Spanned<String>>,
     /// Records that each batched stream has room for, per path slot.
     pub capacity: Spanned<f64>,
+}
+
+/// How kernels that lead back to earlier ones are repeated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Loops {
+    /// The inner loop of a pipeline is over before a round goes on: all its walks end together.
+    #[default]
+    Nested,
+    /// A round runs every kernel once.
+    Flat,
 }
 
 /// Which stages share a kernel.

@@ -1,7 +1,7 @@
 //! The pipeline axis: records, instances, streams, tallies, layers, stages.
 
 use super::merge::AxisFile;
-use super::model::{Field, Layers, Param, Pipeline, RayKind, Record, Stage, Stream, Tally};
+use super::model::{Field, Inner, Layers, Param, Pipeline, RayKind, Record, Stage, Stream, Tally};
 use super::quantity::Quantity;
 use super::section::{Findings, Item, Section};
 use super::{expression, name, param, suggest};
@@ -23,6 +23,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Pipe
         doc: file.doc.clone(),
         start: required_text(top, "start", start_help, findings),
         rounds: required_text(top, "rounds", rounds_help, findings),
+        inner: inner(top, findings),
         records: records(top, &params, findings),
         params,
         state: state(top, findings),
@@ -39,6 +40,18 @@ fn required_text(section: &Section<'_>, key: &str, help: &str, findings: &mut Fi
     let item = section.require(key, help, findings);
     let nowhere = Span { end: section.span.start, ..section.span };
     item.and_then(|item| item.text(findings)).unwrap_or(Spanned { value: String::new(), span: nowhere })
+}
+
+/// The loop inside the rounds; nothing when a part is missing or refused.
+fn inner(top: &Section<'_>, findings: &mut Findings) -> Option<Inner> {
+    let section = top.get("inner")?.section(findings)?;
+    section.allow(&["stage", "turns", "rounds"], findings);
+    let mut text = |key: &str, help: &str| section.require(key, help, findings)?.text(findings);
+    Some(Inner {
+        stage: text("stage", "name the stage that it begins with: `stage = \"trace_eye\"`")?,
+        turns: text("turns", "bound its turns in a round: `turns = \"max_edges - round\"`")?,
+        rounds: text("rounds", "bound the rounds that remain: `rounds = \"max_edges\"`")?,
+    })
 }
 
 fn stored(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Spanned<String>> {

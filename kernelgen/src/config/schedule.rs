@@ -1,15 +1,27 @@
 //! The schedule axis and the precision axis.
 
 use super::merge::AxisFile;
-use super::model::{Accumulate, Fuse, LoadAt, PathOrder, Precision, QueueKind, Real, Schedule};
+use super::model::{Accumulate, Fuse, LoadAt, Loops, PathOrder, Precision, QueueKind, Real, Schedule};
 use super::section::{Findings, Item, Section};
 use super::tree::Data;
 use crate::diagnostic::Diagnostic;
 use crate::source::Spanned;
 
 /// Keys of `[schedule]`.
-pub const KEYS: [&str; 11] =
-    ["fuse", "queue", "order", "sort", "workgroup", "load", "until", "regenerate", "accumulate", "batch", "capacity"];
+pub const KEYS: [&str; 12] = [
+    "fuse",
+    "queue",
+    "order",
+    "sort",
+    "loops",
+    "workgroup",
+    "load",
+    "until",
+    "regenerate",
+    "accumulate",
+    "batch",
+    "capacity",
+];
 /// Keys of `[precision]`.
 pub const PRECISION_KEYS: [&str; 1] = ["real"];
 
@@ -39,6 +51,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
     let load = section.get("load").and_then(|item| item.word(&["entry", "use"], findings));
     let order = section.get("order").and_then(|item| item.word(&["arrival", "slot"], findings));
+    let loops = section.get("loops").and_then(|item| item.word(&["nested", "flat"], findings));
     let sort = section.get("sort").and_then(|item| keys(&item, findings));
     let regenerate = match section.get("regenerate") {
         Some(item) => {
@@ -57,6 +70,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup, QueueKind::None][queue?],
         order: [PathOrder::Arrival, PathOrder::Slot][order.unwrap_or_default()],
         sort: sort.unwrap_or_default(),
+        loops: [Loops::Nested, Loops::Flat][loops.unwrap_or_default()],
         workgroup: workgroup?,
         load: [LoadAt::Entry, LoadAt::Use][load.unwrap_or_default()],
         regenerate: regenerate?,

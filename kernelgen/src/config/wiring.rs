@@ -112,6 +112,10 @@ fn check_rounds(pipeline: &Pipeline, findings: &mut Findings) {
     if let Err(diagnostic) = expression::evaluate_rounds(pipeline) {
         findings.push(diagnostic);
     }
+    if let Some(inner) = &pipeline.inner {
+        check_known(("K0202", "stage"), &inner.stage, &pipeline.stages, findings);
+        findings.extend(expression::evaluate_inner(pipeline, inner).err());
+    }
 }
 
 fn check_sizes(pipeline: &Pipeline, findings: &mut Findings) {

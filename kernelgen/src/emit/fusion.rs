@@ -8,6 +8,7 @@ use super::wiring::WiredStage;
 use crate::config::model::{Fuse, RayKind, Schedule};
 use indexmap::{IndexMap, IndexSet};
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// All kernels of stages.
 #[derive(Clone, Debug, Default)]
@@ -62,9 +63,10 @@ impl Fusion {
         Fusion { start: chain(start), queued: queued.map(|name| (name.clone(), chain(name))).collect() }
     }
 
-    /// How many kernels of the loop lead to this one.
-    pub(super) fn feeders(&self, entry: &str) -> usize {
-        self.queued.values().filter(|chain| chain.feeds.contains(entry)).count()
+    /// How many of these kernels that take paths from queues lead to this one.
+    pub(super) fn feeders(&self, entry: &str, among: Range<usize>) -> usize {
+        let leads = |(place, chain): &(usize, &Chain)| among.contains(place) && chain.feeds.contains(entry);
+        self.queued.values().enumerate().filter(leads).count()
     }
 
     /// Whether a path may need another round: a kernel of the loop leads to one that the round has run by then.

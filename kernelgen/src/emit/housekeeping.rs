@@ -130,10 +130,10 @@ fn weighted(weights: &IndexMap<String, u32>, imports: &mut Imports) -> String {
 }
 
 /// The kernel before the stages of some queues. Streams stand before stages: what is about to start no longer waits.
-pub(super) fn prepare_kernel(name: &str, first_of_round: bool, queues: &[Prepared]) -> String {
+pub(super) fn prepare_kernel(name: &str, counts_round: bool, queues: &[Prepared]) -> String {
     let mut imports = Imports::default();
     let mut body = String::new();
-    if first_of_round {
+    if counts_round {
         imports.add("control", ["control", "CONTROL_ROUND"]);
         body.push_str("    atomicAdd(&control[CONTROL_ROUND], 1u);\n");
     }

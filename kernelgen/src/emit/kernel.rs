@@ -2,6 +2,7 @@
 
 use super::memory::Access;
 use super::queue::Queues;
+use super::stream;
 use super::text::{Imports, PARAMETERS, stage_constant, stream_constant};
 use super::wiring::{WiredStage, WiredStream};
 use crate::config::model::QueueKind;
@@ -29,6 +30,8 @@ pub(super) struct Frame<'a> {
     pub access: &'a Access,
     /// The start stage, where a slot whose path is over in this kernel takes the next.
     pub next: Option<&'a str>,
+    /// Streams that it may push to and whose records the workgroup counts together.
+    pub gathered: &'a [String],
 }
 
 /// What a frame is filled with.
@@ -75,7 +78,7 @@ pub(super) fn stage_kernel(frame: Frame<'_>, stage: &WiredStage) -> String {
 impl Frame<'_> {
     /// The whole text.
     pub(super) fn fill(self, filling: Filling) -> String {
-        let Frame { kernel, queues, access, next, .. } = self;
+        let Frame { kernel, queues, access, next, gathered, .. } = self;
         let Filling { mut imports, heading, locals, instances, body, targets, end, counts } = filling;
         let workgroup = queues.workgroup;
         let (condition, path) = self.path(&mut imports);
@@ -91,6 +94,16 @@ impl Frame<'_> {
             test = format!("    let begun = {condition};\n");
             condition = "begun".to_owned();
             enqueue.push_str(&take_next(start, &targets, queues, &mut imports));
+        }
+        let mut fed = targets.iter().map(|(target, _)| target.as_str()).chain(next);
+        if fed.any(|target| queues.is_waited_for_in_slots(target)) {
+            imports.add("queue", ["count_arrivals"]);
+            enqueue.push_str("    count_arrivals(lane);\n");
+        }
+        for stream in gathered {
+            let function = stream::gather_function(stream);
+            imports.add("streams", [function.as_str()]);
+            let _ = writeln!(enqueue, "    {function}(lane);");
         }
         let loaded = loaded(&instances, access, &mut imports);
         let mut stored = String::new();
@@ -197,9 +210,9 @@ fn enqueue(targets: &[(String, String)], queues: &Queues, imports: &mut Imports)
     for (target, wanted) in targets {
         let constant = stage_constant(target);
         imports.add("queue", [constant.as_str()]);
-        let _ = if queues.is_ordered(target) {
+        let _ = if queues.is_waited_for_in_slots(target) {
             imports.add("queue", ["wait_for"]);
-            writeln!(text, "    if {wanted} {{\n        wait_for({constant}, path_id);\n    }}")
+            writeln!(text, "    wait_for({constant}, {wanted}, path_id);")
         } else {
             imports.add("queue", ["enqueue"]);
             writeln!(text, "    enqueue({constant}, {wanted}, path_id, lane);")

@@ -12,6 +12,7 @@ mod modules;
 mod program;
 mod queue;
 mod room;
+mod rounds;
 mod signature;
 mod sort;
 mod stored;
@@ -24,7 +25,6 @@ mod wiring;
 
 use crate::analyze::{self, Leaf, Liveness};
 use crate::config;
-use crate::config::evaluate_rounds;
 use crate::config::model::{PathOrder, QueueKind, Selection, Variant};
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::layout::{self, Placement};
@@ -35,6 +35,7 @@ use crate::source::{FileKind, Sources};
 use indexmap::IndexSet;
 use program::Program;
 use queue::Queues;
+use rounds::Rounds;
 use std::collections::BTreeMap;
 use wiring::{Texts, Wiring};
 
@@ -58,9 +59,6 @@ pub struct Parts {
 pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, Vec<Diagnostic>> {
     let (variant, mut warnings) = config::load(sources, selection)?;
     check_names(&variant)?;
-    let path_rounds = evaluate_rounds(&variant.pipeline).map_err(|finding| vec![finding])?;
-    let paths_per_slot = room::paths_per_slot(&variant.schedule, path_rounds);
-    let rounds = paths_per_slot * path_rounds;
     let tallies = tally::tallies(&variant.pipeline).map_err(|finding| vec![finding])?;
     let layers = film::layers(&variant.pipeline, &tallies).map_err(|finding| vec![finding])?;
     let constants = modules::constants(&variant.pipeline, &variant.effects);
@@ -75,9 +73,10 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     let liveness = analyze::liveness(&wiring.flow());
     check_initialised(&wiring, &liveness, start)?;
     let placement = layout::assign(&variant, &liveness)?;
-    let queues = queues(&wiring, &variant);
+    let rounds = Rounds::new(&variant, &wiring.fusion).map_err(|finding| vec![finding])?;
+    let queues = queues(&wiring, &variant, &rounds);
     let layers = film::used(layers, &wiring.splats);
-    add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues, rounds);
+    add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues, rounds.most);
     add_module(sources, &mut modules, "film", film::module(variant.schedule.accumulate, &layers));
     let program = Program {
         variant: &variant,
@@ -86,8 +85,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
         placement: &placement,
         queues: &queues,
         constants: &constants,
-        rounds,
-        paths_per_slot,
+        rounds: &rounds,
         tallies: &tallies,
         layers: &layers,
     };
@@ -183,20 +181,20 @@ fn add_state_modules(
         ("sort", sort::module(queues.workgroup)),
         ("tables", memory::module(placement)),
         ("stored", stored::module(&variant.pipeline, &placement.leaves)),
-        ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule))),
+        ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule), queues.gathers())),
     ];
     for (name, text) in texts {
         add_module(sources, modules, name, text);
     }
 }
 
-fn queues(wiring: &Wiring, variant: &Variant) -> Queues {
+fn queues(wiring: &Wiring, variant: &Variant, rounds: &Rounds) -> Queues {
     let batched = wiring.streams.iter().filter(|(_, stream)| stream.batched);
     let stages: Vec<String> = wiring.fusion.queued.keys().cloned().collect();
     let kind = variant.schedule.queue;
     let sorts = variant.schedule.order == PathOrder::Slot && kind != QueueKind::None;
     let has_key = |stage: &String| wiring.stages.get(stage).is_some_and(|stage| stage.key.is_some());
-    let mixed = |stage: &&String| sorts && wiring.fusion.feeders(stage) > 1 && !has_key(stage);
+    let mixed = |stage: &&String| sorts && rounds.mixes(&wiring.fusion, stage) && !has_key(stage);
     Queues {
         ordered: stages.iter().filter(mixed).cloned().collect(),
         stages,

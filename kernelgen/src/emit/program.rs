@@ -7,6 +7,7 @@ use super::kernel::{self, Frame, Source};
 use super::memory::{self, Access};
 use super::queue::{self, Queues};
 use super::room;
+use super::rounds::{InnerLoop, Rounds};
 use super::sort;
 use super::stream;
 use super::tally;
@@ -29,9 +30,7 @@ pub(super) struct Program<'a> {
     pub placement: &'a Placement,
     pub queues: &'a Queues,
     pub constants: &'a Constants,
-    /// Of all paths that a slot takes.
-    pub rounds: u32,
-    pub paths_per_slot: u32,
+    pub rounds: &'a Rounds,
     pub tallies: &'a [Tally],
     pub layers: &'a [Layers],
 }
@@ -100,8 +99,8 @@ impl Builder<'_> {
             consumers.keys().map(|stream| self.prepared_stream(stream, Entries::Stream(stream.clone()))).collect();
         let mut steps = vec![Step::Single { kernel: begin }, Step::Dispatch { kernel: first }];
         if !body.is_empty() {
-            let rounds = if fusion.is_repeated() { program.rounds } else { 1 };
-            steps.push(Step::Loop { rounds, body });
+            let rounds = if fusion.is_repeated() { program.rounds.outer } else { 1 };
+            steps.push(Step::Loop { turns: vec![rounds], body });
         }
         if program.queues.count() > 0 {
             let finish = self.housekeeping("finish", housekeeping::finish_kernel(program.queues, &left), 1);
@@ -123,17 +122,30 @@ impl Builder<'_> {
         consumers
     }
 
-    /// The steps of a round: stages in groups behind one prepare kernel each, which also empties the streams that this group is the
-    /// first to push to, if need be.
+    /// The steps of a round.
     fn round(&mut self, consumers: &IndexMap<String, Step>) -> Vec<Step> {
+        let stages = self.program.queues.stages.as_slice();
+        let Some(InnerLoop { kernels, turns }) = &self.program.rounds.inner else {
+            return self.turn(stages, true, consumers);
+        };
+        let mut body = self.turn(&stages[..kernels.start], false, consumers);
+        let inner = self.turn(&stages[kernels.clone()], true, consumers);
+        body.push(Step::Loop { turns: turns.clone(), body: inner });
+        body.extend(self.turn(&stages[kernels.end..], false, consumers));
+        body
+    }
+
+    /// The steps of a loop's turn: stages in groups behind one prepare kernel each, which also empties the streams that this group may
+    /// push to, if need be. The first may count the turn as one of the rounds by which rays are told apart.
+    fn turn(&mut self, stages: &[String], counts: bool, consumers: &IndexMap<String, Step>) -> Vec<Step> {
         let queues = self.program.queues;
         let mut body = Vec::new();
-        for group in self.groups() {
-            let streams: Vec<&String> = queues.streams.iter().filter(|stream| self.begins(&group, stream)).collect();
+        for group in self.groups(stages) {
+            let streams: Vec<&String> = queues.streams.iter().filter(|stream| self.pushes(&group, stream)).collect();
             let mut prepared: Vec<Prepared> = streams.iter().map(|stream| self.prepared_full(stream, &group)).collect();
             prepared.extend(group.iter().map(|stage| self.prepared_stage(stage)));
             let name = format!("prepare_{}", group[0]);
-            self.prepare(&name, &prepared, &mut body);
+            self.prepare(&name, &prepared, counts && body.is_empty(), &mut body);
             body.extend(streams.into_iter().filter_map(|stream| consumers.get(stream)).cloned());
             for stage in group {
                 body.extend(self.put_in_order(&stage));
@@ -144,18 +156,17 @@ impl Builder<'_> {
         body
     }
 
-    /// Whether this group is the first of a round that may push to the stream.
-    fn begins(&self, group: &[String], stream: &str) -> bool {
+    /// Whether this group may push to the stream.
+    fn pushes(&self, group: &[String], stream: &str) -> bool {
         let pushes = &self.program.wiring.streams[stream].pushes;
-        let first = self.program.queues.stages.iter().find(|stage| pushes.contains_key(*stage));
-        first.is_some_and(|first| group.contains(first))
+        group.iter().any(|stage| pushes.contains_key(stage))
     }
 
     /// Consecutive kernels, by entry, of which none feeds a later one: their queues are complete when the first of them runs.
-    fn groups(&self) -> Vec<Vec<String>> {
+    fn groups(&self, stages: &[String]) -> Vec<Vec<String>> {
         let feeds = |from: &String, to: &String| self.program.wiring.fusion.queued[from].feeds.contains(to);
         let mut groups: Vec<Vec<String>> = Vec::new();
-        for stage in &self.program.queues.stages {
+        for stage in stages {
             match groups.last_mut() {
                 Some(group) if !group.iter().any(|earlier| feeds(earlier, stage)) => {
                     group.push(stage.clone());
@@ -182,17 +193,16 @@ impl Builder<'_> {
         Prepared { entries, rays: self.program.wiring.streams[name].rays }
     }
 
-    /// Empties a stream before a group of stages if this group and those after it might overfill it.
+    /// Empties a stream before a group of stages if this group might overfill it.
     fn prepared_full(&self, name: &str, group: &[String]) -> Prepared {
-        let Program { wiring, queues, .. } = self.program;
-        let done = queues.stages.iter().position(|stage| *stage == group[0]).unwrap_or_default();
-        let ahead = room::ahead_in_round(&wiring.fusion, done, &wiring.streams[name].pushes);
+        let pushes = &self.program.wiring.streams[name].pushes;
+        let ahead = group.iter().filter_map(|stage| Some((stage.clone(), *pushes.get(stage)?))).collect();
         self.prepared_stream(name, Entries::FullStream { stream: name.to_owned(), ahead })
     }
 
-    /// Adds a prepare kernel; the first of a round counts the round.
-    fn prepare(&mut self, name: &str, prepared: &[Prepared], body: &mut Vec<Step>) {
-        let text = housekeeping::prepare_kernel(name, body.is_empty(), prepared);
+    /// Adds a prepare kernel, which may count the round.
+    fn prepare(&mut self, name: &str, prepared: &[Prepared], counts: bool, body: &mut Vec<Step>) {
+        let text = housekeeping::prepare_kernel(name, counts, prepared);
         let kernel = self.housekeeping(name, text, 1);
         body.push(Step::Single { kernel });
     }
@@ -228,7 +238,8 @@ impl Builder<'_> {
         let name = format!("count_keys_{stage}");
         let traffic = KernelTraffic { loads: key.reads.keys().cloned().collect(), ..KernelTraffic::default() };
         let access = memory::access(placement, &traffic, &BTreeMap::new());
-        let frame = Frame { kernel: &name, entry: stage, source: Source::Queue, queues, access: &access, next: None };
+        let (kernel, source) = (name.as_str(), Source::Queue);
+        let frame = Frame { kernel, entry: stage, source, queues, access: &access, next: None, gathered: &[] };
         let text = sort::count_kernel(frame, key);
         let (workgroup, load_bytes) = (queues.workgroup, access.load_bytes);
         self.compile(Draft { name, text, workgroup, load_bytes, ..Draft::default() })
@@ -272,7 +283,8 @@ impl Builder<'_> {
         let starts_again = source == Source::Slots && wiring.fusion.queued.contains_key(entry);
         let kernel = if starts_again { format!("{entry}_first") } else { entry.to_owned() };
         let next = (queues.regenerates && chain.ends).then_some(wiring.fusion.start.entry.as_str());
-        let frame = Frame { kernel: &kernel, entry, source, queues, access: &access, next };
+        let gathered = &self.gathered(entry);
+        let frame = Frame { kernel: &kernel, entry, source, queues, access: &access, next, gathered };
         let text = match wiring.stages.get(entry) {
             Some(stage) if !chain.is_fused() => kernel::stage_kernel(frame, stage),
             _ => chain::chain_kernel(frame, wiring, chain),
@@ -287,6 +299,13 @@ impl Builder<'_> {
             store_bytes: access.store_bytes,
             rays: self.rays(chain),
         })
+    }
+
+    /// The streams that a kernel may push to, if workgroups gather their records.
+    fn gathered(&self, entry: &str) -> Vec<String> {
+        let Program { wiring, queues, .. } = self.program;
+        let pushes = |name: &&String| queues.gathers() && wiring.streams[*name].pushes.contains_key(entry);
+        queues.streams.iter().filter(pushes).cloned().collect()
     }
 
     fn consumer(&mut self, name: &str) -> usize {
@@ -381,7 +400,7 @@ impl Builder<'_> {
             bytes_per_path: placement.bytes_per_path(),
             ray_bytes_per_path: placement.ray_bytes_per_path(),
             slots_per_grain: room::slots(self.program.wiring, &self.program.variant.schedule),
-            paths_per_slot: self.program.paths_per_slot,
+            paths_per_slot: self.program.rounds.paths_per_slot,
             needs,
             buffers: buffers.into_values().collect(),
         };

@@ -64,6 +64,21 @@ impl Queues {
         self.ordered.iter().any(|name| name == stage)
     }
 
+    /// Whether paths wait for a stage in their slots, not in its queue.
+    pub(super) fn is_waited_for_in_slots(&self, stage: &str) -> bool {
+        self.kind == QueueKind::None || self.is_ordered(stage)
+    }
+
+    /// Whether paths wait in their slots for any stage.
+    fn waits_in_slots(&self) -> bool {
+        self.kind == QueueKind::None || !self.ordered.is_empty()
+    }
+
+    /// Whether the records that a workgroup pushes to a stream are counted together.
+    pub(super) fn gathers(&self) -> bool {
+        matches!(self.kind, QueueKind::Workgroup | QueueKind::None)
+    }
+
     /// Words of the control buffer.
     pub(super) fn control_words(&self) -> u32 {
         self.taken_word() + u32::from(self.regenerates)
@@ -177,9 +192,16 @@ pub(super) fn queue_module(queues: &Queues) -> String {
     for (stream, number) in queues.streams.iter().zip(queues.stages.len()..) {
         let _ = writeln!(text, "const {}: u32 = {number}u;", stream_constant(stream));
     }
-    let _ = writeln!(
+    let _ = write!(
         text,
-        "\n/// Words with a bit for every invocation of a workgroup.\nconst WORKGROUP_WORDS: u32 = {}u;",
+        "\n/// Stages with a queue.\n\
+         const STAGE_QUEUES: u32 = {}u;\n\n\
+         /// Threads of the workgroups that take from queues.\n\
+         const WORKGROUP_THREADS: u32 = {}u;\n\n\
+         /// Words with a bit for every invocation of a workgroup.\n\
+         const WORKGROUP_WORDS: u32 = {}u;\n",
+        queues.stages.len(),
+        queues.workgroup,
         queues.workgroup.div_ceil(32)
     );
     text.push_str(QUEUE);
@@ -190,8 +212,11 @@ pub(super) fn queue_module(queues: &Queues) -> String {
         QueueKind::Atomic => ENQUEUE_ATOMIC,
         QueueKind::Subgroup => ENQUEUE_SUBGROUP,
         QueueKind::Workgroup => ENQUEUE_WORKGROUP,
-        QueueKind::None => MARK,
+        QueueKind::None => TAKES,
     });
+    if queues.waits_in_slots() {
+        text.push_str(WAIT);
+    }
     if !queues.ordered.is_empty() {
         text.push_str(ORDER);
     }
@@ -297,32 +322,37 @@ fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
 }
 ";
 
-/// Dispatches of stages have an invocation for every slot then, or none where no path waits.
-const MARK: &str = r"
-/// The stage that a path waits for, its number plus one; 0: none.
+/// Paths wait in their slots.
+const WAIT: &str = r"
+/// The stage that a path waits for in its slot, its number plus one; 0: none.
 var<storage, read_write> waits_for: array<u32>;
 
-/// Paths of this workgroup that a stage gets.
-var<workgroup> arrivals: atomic<u32>;
+/// Paths of this workgroup that begin to wait, by stage.
+var<workgroup> arrivals: array<atomic<u32>, STAGE_QUEUES>;
 
-/// Lets this path wait for a stage where `wanted`, and counts how many do, with one atomic a workgroup; `lane` numbers its
-/// invocations, which must all call it.
-fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
-    if lane == 0u {
-        atomicStore(&arrivals, 0u);
-    }
-    workgroupBarrier();
+/// Lets this path wait for a stage where `wanted`.
+fn wait_for(number: u32, wanted: bool, path: u32) {
     if wanted {
         waits_for[path] = number + 1u;
-        atomicAdd(&arrivals, 1u);
+        atomicAdd(&arrivals[number], 1u);
     }
-    workgroupBarrier();
-    if lane == 0u && atomicLoad(&arrivals) > 0u {
-        atomicAdd(&control[waiting_word(number)], atomicLoad(&arrivals));
-    }
-    workgroupBarrier();
 }
 
+/// Adds how many paths of this workgroup begin to wait, with one atomic a stage: all invocations of a device on one word would wait
+/// for one another. `lane` numbers its invocations, which must all call it, once.
+fn count_arrivals(lane: u32) {
+    workgroupBarrier();
+    for (var number = lane; number < STAGE_QUEUES; number += WORKGROUP_THREADS) {
+        let counted = atomicLoad(&arrivals[number]);
+        if counted > 0u {
+            atomicAdd(&control[waiting_word(number)], counted);
+        }
+    }
+}
+";
+
+/// Dispatches of stages have an invocation for every slot then, or none where no path waits.
+const TAKES: &str = r"
 /// Whether the path of a slot waits for a stage, which takes it then.
 fn takes(number: u32, path: u32) -> bool {
     if path >= pass_info.slots || waits_for[path] != number + 1u {
@@ -334,15 +364,6 @@ fn takes(number: u32, path: u32) -> bool {
 ";
 
 const ORDER: &str = r"
-/// The queue that a path waits for, plus one; 0: none that is put in order.
-var<storage, read_write> waits_for: array<u32>;
-
-/// Lets this path wait for a queue that is put in order.
-fn wait_for(number: u32, path: u32) {
-    atomicAdd(&control[waiting_word(number)], 1u);
-    waits_for[path] = number + 1u;
-}
-
 /// Takes this path into a queue if it waits for that. To be called by all invocations of a workgroup.
 fn take_in_order(number: u32, path: u32, lane: u32) {
     let wanted = path < pass_info.slots && waits_for[path] == number + 1u;

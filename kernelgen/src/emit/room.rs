@@ -1,18 +1,15 @@
 //! Room in batched streams: how much a stream has, how much a round may need, and so when it is emptied and how many slots a pass
 //! may use.
 //!
-//! Records collect over the rounds of a pass. Once a round, before the first stage that may push, the device adds up what the
-//! paths that wait can still push in this round. Only if so many might find no room behind what is already there is the stream
-//! emptied first. A pass uses so few slots that an emptied stream takes whatever one round pushes, so none ever overflows.
+//! Records collect over the rounds of a pass. Before kernels that may push, the device adds up what the paths that wait for them can
+//! push there. Only if so many might find no room behind what is already there is the stream emptied first. A pass uses so few slots
+//! that an emptied stream takes whatever a kernel pushes for all of them, so none ever overflows.
 
-use super::fusion::Fusion;
 use super::wiring::Wiring;
+use crate::config::MOST_ROUNDS;
 use crate::config::model::Schedule;
 use crate::plan::SLOT_GRAIN;
 use indexmap::IndexMap;
-
-/// Rounds of a pass at most: 32-bit counters of rays must survive it.
-const MOST_ROUNDS: u32 = 1000;
 
 /// Paths that a pass may have for each slot, if one takes so many rounds.
 pub(super) fn paths_per_slot(schedule: &Schedule, rounds: u32) -> u32 {
@@ -33,8 +30,8 @@ pub(super) fn text(records: u32) -> String {
     }
 }
 
-/// Most records that a path which is about to run one of these stages or kernels can still push, by name; 0 is left out. They run in
-/// this order; `leads` says whether one leads to another.
+/// Most records that a path which is about to run one of these stages of a kernel can still push there, by name; 0 is left out. They
+/// run in this order; `leads` says whether one leads to another.
 pub(super) fn ahead<'a>(
     order: impl DoubleEndedIterator<Item = &'a String>,
     leads: impl Fn(&str, &str) -> bool,
@@ -51,18 +48,6 @@ pub(super) fn ahead<'a>(
     }
     ahead.reverse();
     ahead
-}
-
-/// `ahead` for paths that wait for kernels which a round has yet to run: those behind the first `done`.
-pub(super) fn ahead_in_round(fusion: &Fusion, done: usize, pushes: &IndexMap<String, u32>) -> IndexMap<String, u32> {
-    let leads = |from: &str, to: &str| fusion.queued.get(from).is_some_and(|chain| chain.feeds.contains(to));
-    ahead(fusion.queued.keys().skip(done), leads, pushes)
-}
-
-/// Most records that a path pushes between two moments at which the stream may be emptied: in a round, or in the first kernel.
-pub(super) fn most(fusion: &Fusion, pushes: &IndexMap<String, u32>) -> u32 {
-    let in_a_round = ahead_in_round(fusion, 0, pushes).into_values();
-    in_a_round.chain(pushes.get(&fusion.start.entry).copied()).max().unwrap_or(0)
 }
 
 /// Slots that a pass may use of every `SLOT_GRAIN`.

@@ -34,9 +34,14 @@ pub(super) fn room_function(stream: &str) -> String {
     format!("{stream}_room")
 }
 
-/// The module for kernels: batched streams append to their buffer, which has room for `records` (see `room::records`), the others
-/// call their consumer.
-pub(super) fn module(pipeline: &Pipeline, wiring: &Wiring, records: u32) -> String {
+/// The WGSL function that stores what a workgroup has pushed to a batched stream, where workgroups gather their records.
+pub(super) fn gather_function(stream: &str) -> String {
+    format!("gather_{stream}")
+}
+
+/// The module for kernels: batched streams append to their buffer, which has room for `records` (see `room::records`), one by one or
+/// where workgroups gather them with one atomic a workgroup; the others call their consumer.
+pub(super) fn module(pipeline: &Pipeline, wiring: &Wiring, records: u32, gathers: bool) -> String {
     let mut imports = Imports::default();
     let mut body = String::new();
     for (name, declared) in &pipeline.streams {
@@ -45,7 +50,7 @@ pub(super) fn module(pipeline: &Pipeline, wiring: &Wiring, records: u32) -> Stri
         match wiring.streams.get(name) {
             Some(stream) if stream.batched => {
                 push_room(&mut imports, &mut body, name, records);
-                push_batched(&mut imports, &mut body, name, record, stream);
+                push_batched(&mut imports, &mut body, name, record, stream, gathers);
             }
             Some(stream) => push_inline(&mut imports, &mut body, name, record, stream),
             None => push_nowhere(&mut body, name, record),
@@ -94,25 +99,100 @@ fn push_room(imports: &mut Imports, body: &mut String, name: &str, records: u32)
     );
 }
 
-fn push_batched(imports: &mut Imports, body: &mut String, name: &str, record: &str, stream: &WiredStream) {
+fn push_batched(
+    imports: &mut Imports,
+    body: &mut String,
+    name: &str,
+    record: &str,
+    stream: &WiredStream,
+    gathers: bool,
+) {
     let buffer = buffer_name(name);
-    let constant = stream_constant(name);
     imports.add("control", ["control", "CONTROL_OVERFLOW"]);
-    imports.add("queue", ["append", constant.as_str()]);
+    imports.add("queue", ["append", stream_constant(name).as_str()]);
     imports.add("real", ["real", "vec2r", "vec3r"]);
-    let room = room_function(name);
     let _ = write!(
         body,
         "\n/// Records that wait for `{}`, a plane a word.\n\
          var<storage, read_write> {buffer}: array<u32>;\n",
         stream.entry.name,
     );
+    if gathers {
+        push_gathered(imports, body, name, record, stream);
+    } else {
+        push_at_once(body, name, record);
+    }
+    push_store_and_load(body, name, record, stream);
+}
+
+/// A place a record.
+fn push_at_once(body: &mut String, name: &str, record: &str) {
+    let constant = stream_constant(name);
     let _ = write!(
         body,
         "\n/// Keeps a record until the stream is emptied.\n\
          fn push_{name}(record: {record}) {{\n    \
+             store_{name}(append({constant}), record);\n\
+         }}\n"
+    );
+}
+
+/// A place for the records of a workgroup, taken at the end of the kernel: until then an invocation keeps its last record.
+fn push_gathered(imports: &mut Imports, body: &mut String, name: &str, record: &str, stream: &WiredStream) {
+    let constant = stream_constant(name);
+    let function = gather_function(name);
+    imports.add("control", ["waiting_word"]);
+    let mut earlier = String::new();
+    if stream.pushes.values().any(|most| *most > 1) {
+        earlier = format!(
+            "    if has_{name} {{\n        \
+                 store_{name}(append({constant}), last_{name});\n    \
+             }}\n"
+        );
+    }
+    let _ = write!(
+        body,
+        "\n/// The last record of this invocation.\n\
+         var<private> last_{name}: {record};\n\
+         /// Whether there is one.\n\
+         var<private> has_{name}: bool;\n\
+         /// How many of this workgroup have one.\n\
+         var<workgroup> {name}_share: atomic<u32>;\n\
+         /// Where their places begin.\n\
+         var<workgroup> {name}_base: u32;\n\n\
+         /// Keeps a record until the stream is emptied.\n\
+         fn push_{name}(record: {record}) {{\n\
+         {earlier}    \
+             last_{name} = record;\n    \
+             has_{name} = true;\n\
+         }}\n\n\
+         /// Stores the last records of this workgroup side by side, with one atomic on the stream's counter. `lane` numbers its\n\
+         /// invocations, which must all call it, once.\n\
+         fn {function}(lane: u32) {{\n    \
+             var rank = 0u;\n    \
+             if has_{name} {{\n        \
+                 rank = atomicAdd(&{name}_share, 1u);\n    \
+             }}\n    \
+             workgroupBarrier();\n    \
+             if lane == 0u && atomicLoad(&{name}_share) > 0u {{\n        \
+                 {name}_base = atomicAdd(&control[waiting_word({constant})], atomicLoad(&{name}_share));\n    \
+             }}\n    \
+             workgroupBarrier();\n    \
+             if has_{name} {{\n        \
+                 store_{name}({name}_base + rank, last_{name});\n    \
+             }}\n\
+         }}\n"
+    );
+}
+
+fn push_store_and_load(body: &mut String, name: &str, record: &str, stream: &WiredStream) {
+    let buffer = buffer_name(name);
+    let room = room_function(name);
+    let _ = write!(
+        body,
+        "\n/// Puts a record into its place.\n\
+         fn store_{name}(index: u32, record: {record}) {{\n    \
              let room = {room}();\n    \
-             let index = append({constant});\n    \
              if index >= room {{\n        \
                  atomicAdd(&control[CONTROL_OVERFLOW], 1u);\n        \
                  return;\n    \

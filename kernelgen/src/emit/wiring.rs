@@ -442,7 +442,7 @@ impl Wirer<'_> {
         let analysed = self.analyse(entry, check, &bind, None)?;
         check_consumer(name, stream, &analysed)?;
         let pushes = if batched { self.pushes(name)? } else { IndexMap::new() };
-        let most = room::most(&self.wiring.fusion, &pushes);
+        let most = pushes.values().copied().max().unwrap_or(0);
         check_room(variant, name, stream, most)?;
         Ok(WiredStream {
             leaves: read_leaves(variant, name, stream, &analysed.facts),

@@ -90,7 +90,7 @@ fn plan(film: Accumulate) -> Plan {
             Step::Single { kernel: 0 },
             Step::Dispatch { kernel: 1 },
             Step::Single { kernel: 2 },
-            Step::Loop { rounds: 2, body: vec![Step::Indirect { kernel: 3, slot: 1 }] },
+            Step::Loop { turns: vec![2], body: vec![Step::Indirect { kernel: 3, slot: 1 }] },
         ],
         counters: vec![counter("rays_primary", 1), counter("rays_visibility", 2), counter("overflow", 4)],
         // `deep` takes as many as `emit` has counted.
