@@ -140,8 +140,9 @@ pub enum Role {
     TallyCounts,
     /// Counts of earlier samples for each path, an f32 an index of a tally; written by the runtime.
     TallyRates,
-    /// Uniform, 32 bytes, written by the runtime before each pass: u32 first_pixel, first_sample, active, width, height, seed, paths, 0.
-    /// Path i of the pass, which slot i takes if there are so many, works on linear = first_pixel + i; sample = first_sample + linear / (width*height); pixel = tile order of linear % (width*height).
+    /// Uniform, 32 bytes, written by the runtime before each pass: u32 first_pixel, first_sample, active, seed, paths, and three zeros.
+    /// Path i of the pass, which slot i takes if there are so many, works on linear = first_pixel + i;
+    /// sample = first_sample + linear / (width*height); pixel = tile order of linear % (width*height).
     Pass,
     /// A scene resource that the runtime provides under this name.
     Resource,
@@ -158,6 +159,9 @@ pub struct Size {
     pub per_pixel: u64,
 }
 
+/// What the runtime says when it compiles a kernel: path slots, columns and rows of the picture. Divisions by constants are cheap.
+pub const OVERRIDES: [&str; 3] = ["path_count", "picture_width", "picture_height"];
+
 /// A kernel.
 #[derive(Clone, Debug, Serialize)]
 pub struct Kernel {
@@ -165,10 +169,10 @@ pub struct Kernel {
     pub name: String,
     /// The entry point.
     pub entry: String,
-    /// The WGSL text. It has `override path_count: u32` if `uses_path_count`.
+    /// The WGSL text.
     pub module: String,
-    /// Whether the module declares `override path_count`.
-    pub uses_path_count: bool,
+    /// Those of `OVERRIDES` that the text declares, each a `u32`.
+    pub overrides: Vec<String>,
     /// Bindings of group 0.
     pub bindings: Vec<Binding>,
     /// Threads in a workgroup.

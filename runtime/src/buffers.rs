@@ -10,7 +10,7 @@ const DEFAULT_PATHS_GPU: u64 = 1 << 22;
 /// Path slots on a CPU adapter when not asked otherwise.
 const DEFAULT_PATHS_CPU: u64 = 1 << 17;
 /// The most that may be asked for: 32-bit ray counters must survive a pass of a thousand rounds.
-const MOST_PATHS: u64 = 1 << 24;
+const MOST_PATHS: u64 = 1 << 22;
 /// Slots come in multiples of this.
 const GRAIN: u64 = SLOT_GRAIN as u64;
 
@@ -24,6 +24,8 @@ pub struct Buffers {
     pub all: Vec<Option<wgpu::Buffer>>,
     /// Path slots.
     pub path_count: u32,
+    /// Columns and rows of the picture.
+    pub size: [u32; 2],
 }
 
 impl Buffers {
@@ -31,7 +33,8 @@ impl Buffers {
     ///
     /// # Errors
     /// User input when the scene lacks a resource, or a table is larger than the adapter can bind; failed when memory runs out.
-    pub fn new(gpu: &Gpu, plan: &Plan, pixels: u64, path_count: u32, resources: &Resources) -> Result<Self, Error> {
+    pub fn new(gpu: &Gpu, plan: &Plan, size: [u32; 2], path_count: u32, resources: &Resources) -> Result<Self, Error> {
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
         let mut all = Vec::with_capacity(plan.buffers.len());
         for (index, buffer) in plan.buffers.iter().enumerate() {
             let made = match buffer.role {
@@ -40,7 +43,7 @@ impl Buffers {
             };
             all.push(made);
         }
-        Ok(Self { all, path_count })
+        Ok(Self { all, path_count, size })
     }
 
     /// The only buffer of a role.

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::profile::{Measured, Profile, Queries};
 use crate::program::{Command, Extent, commands};
 use bytemuck::{Pod, Zeroable};
-use kernelgen::plan::{Access, Kernel, Plan, Role};
+use kernelgen::plan::{Access, Kernel, OVERRIDES, Plan, Role};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -29,16 +29,12 @@ pub struct Pass {
     pub first_sample: u32,
     /// Slots in use.
     pub active: u32,
-    /// Pixels in a row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
     /// Seed of the random numbers.
     pub seed: u32,
     /// Paths, more than slots where these take several.
     pub paths: u32,
     /// Padding.
-    pub unused: u32,
+    pub unused: [u32; 3],
 }
 
 #[derive(Debug)]
@@ -255,7 +251,12 @@ fn pipeline(gpu: &Gpu, plan: &Plan, kernel: &Kernel, buffers: &Buffers) -> Resul
     let module = gpu.module(name, &kernel.module)?;
     let layout = bind_group_layout(gpu, kernel)?;
     let bindings = bind_group(gpu, plan, kernel, buffers, &layout)?;
-    let constants = [("path_count", f64::from(buffers.path_count))];
+    let values = [buffers.path_count, buffers.size[0], buffers.size[1]];
+    let constants: Vec<(&str, f64)> = OVERRIDES
+        .into_iter()
+        .zip(values.map(f64::from))
+        .filter(|(name, _)| kernel.overrides.iter().any(|used| used == name))
+        .collect();
     let pipeline = gpu.scoped(name, || {
         let pipeline_layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(name),
@@ -267,10 +268,7 @@ fn pipeline(gpu: &Gpu, plan: &Plan, kernel: &Kernel, buffers: &Buffers) -> Resul
             layout: Some(&pipeline_layout),
             module: &module,
             entry_point: Some(&kernel.entry),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: if kernel.uses_path_count { &constants } else { &[] },
-                ..Default::default()
-            },
+            compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
             cache: None,
         })
     })?;

@@ -147,7 +147,7 @@ impl Session {
         let pixels = pixels_of(settings.size)?;
         let total = work.map(|samples| u64::from(samples) * u64::from(pixels));
         let path_count = choose_path_count(gpu, plan, pixels.into(), settings.paths, total)?;
-        let buffers = Buffers::new(gpu, plan, pixels.into(), path_count, resources)?;
+        let buffers = Buffers::new(gpu, plan, settings.size, path_count, resources)?;
         let accumulator = Accumulator::new(
             gpu,
             plan.film,
@@ -521,11 +521,9 @@ fn pass_at(settings: &Settings, seed: u32, sample: u32, done: u64, [slots, paths
         first_pixel: (done % pixels) as u32,
         first_sample: sample + (done / pixels) as u32,
         active: slots.min(paths),
-        width,
-        height,
         seed,
         paths,
-        unused: 0,
+        unused: [0; 3],
     }
 }
 

@@ -1,6 +1,7 @@
 //! The settings of a render, as they stand in `configs/renders/*.toml` and in the metadata of a picture.
 
 use crate::configs::{Axis, Library, with_scene};
+use crate::device::Gpu;
 use crate::error::Error;
 use crate::render::{Rendered, Until};
 use crate::scene::{self, BuildPreset, LoadOptions, Scene};
@@ -169,6 +170,31 @@ pub struct State {
     pub tallies: Option<Tallied>,
 }
 
+/// What kernels are generated for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Target {
+    /// A GPU, also where no adapter is there to ask.
+    #[default]
+    Gpu,
+    /// A software device: workgroup barriers are dear, and a cache holds whole records.
+    Cpu,
+}
+
+impl Target {
+    /// That of an adapter.
+    pub fn of(gpu: &Gpu) -> Self {
+        if gpu.is_cpu() { Self::Cpu } else { Self::Gpu }
+    }
+
+    /// The shipped layout and schedule to use where none is chosen.
+    fn layout_and_schedule(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Gpu => ("compact", "ordered"),
+            Self::Cpu => ("aos", "wavefront"),
+        }
+    }
+}
+
 impl RenderFile {
     /// Reads the text of a render file.
     ///
@@ -232,14 +258,15 @@ impl RenderFile {
         }
     }
 
-    /// Fills in what was not chosen: bidirectional path tracing, array of structures (a bidirectional path visits its stages in no
-    /// order, so its words had better be neighbours), wavefront, f32.
+    /// Fills in what was not chosen: bidirectional path tracing in f32, with the layout and the schedule that are best on such an
+    /// adapter (docs/performance.md). None of them changes the picture.
     #[must_use]
-    pub fn with_defaults(self) -> Self {
+    pub fn with_defaults(self, target: Target) -> Self {
+        let (layout, schedule) = target.layout_and_schedule();
         Self {
             pipeline: Some("sbdpt".to_owned()),
-            layout: Some("aos".to_owned()),
-            schedule: Some("wavefront".to_owned()),
+            layout: Some(layout.to_owned()),
+            schedule: Some(schedule.to_owned()),
             precision: Some("f32".to_owned()),
             ..Self::default()
         }
@@ -372,6 +399,17 @@ mod tests {
         assert_eq!((merged.size, merged.pipeline.as_deref()), (Some([8, 8]), Some("pt")));
         assert_eq!(merged.camera, Some(Camera::Index(1)));
         assert_eq!(merged.set.values().map(SetValue::word).collect::<Vec<_>>(), ["9", "true"]);
+    }
+
+    #[test]
+    fn what_is_not_chosen_suits_the_target() {
+        let filled = |target| RenderFile::default().with_defaults(target);
+        let axes = |settings: RenderFile| (settings.pipeline, settings.layout, settings.schedule, settings.precision);
+        let words = |words: [&str; 4]| words.map(|word| Some(word.to_owned())).into();
+        assert_eq!(axes(filled(Target::Gpu)), words(["sbdpt", "compact", "ordered", "f32"]));
+        assert_eq!(axes(filled(Target::Cpu)), words(["sbdpt", "aos", "wavefront", "f32"]));
+        let chosen = RenderFile { layout: Some("soa".to_owned()), ..RenderFile::default() };
+        assert_eq!(chosen.with_defaults(Target::Gpu).layout.as_deref(), Some("soa"));
     }
 
     #[test]

@@ -18,8 +18,8 @@ pub fn size(kernel: &Kernel) -> Result<u64, Error> {
         .validate(&module)
         .map_err(|error| refused(&error.into_inner()))?;
     let entry = Some((ShaderStage::Compute, kernel.entry.as_str()));
-    // Every number of paths is one word of the binary.
-    let constants = kernel.uses_path_count.then(|| ("path_count".to_owned(), 1024.0)).into_iter().collect();
+    // Every number is one word of the binary, whatever its value.
+    let constants = kernel.overrides.iter().map(|name| (name.clone(), 1024.0)).collect();
     let (module, info) = process_overrides(&module, &info, entry, &constants).map_err(|error| refused(&error))?;
     let pipeline = spv::PipelineOptions { shader_stage: ShaderStage::Compute, entry_point: kernel.entry.clone() };
     let words = spv::write_vec(&module, &info, &unchecked(), Some(&pipeline)).map_err(|error| refused(&error))?;

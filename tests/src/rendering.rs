@@ -14,7 +14,7 @@ use runtime::film::Sums;
 use runtime::image_file::Image;
 use runtime::render::{Rendered, Session, Settings, Until};
 use runtime::scene::{Accelerator, LoadOptions, Scene};
-use runtime::settings::{RenderFile, SetValue};
+use runtime::settings::{RenderFile, SetValue, Target};
 use runtime::tallies::Tallied;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -86,7 +86,7 @@ impl Job {
         Job {
             scene: scene.into(),
             options: LoadOptions::default(),
-            settings: RenderFile::default().with_defaults(),
+            settings: RenderFile::default().with_defaults(Target::Cpu),
             library: Library::default(),
             size: [32, 32],
             samples: 64,

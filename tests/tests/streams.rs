@@ -56,6 +56,23 @@ fn every_order_of_queues_gives_the_same_bits() {
     }
 }
 
+/// Where a workgroup gathers records, an invocation keeps its last one for it; what a stage pushed before that must not be lost.
+#[test]
+fn records_that_a_stage_pushes_in_a_row_all_arrive() {
+    let once = "push_connection(connection_of(walk, surface, segment, contribution, pixel));";
+    let thrice = format!(
+        "{once}\n        push_connection(connection_of(walk, surface, segment, 0.25 * contribution, pixel));\n        {once}"
+    );
+    let job = |schedule: &str| job("pt").edited("transport/direct", once, &thrice).schedule(schedule);
+    let expected = job("inline").render();
+    let once = self::job("pt").schedule("inline").render();
+    assert_eq!(expected.visibility, 3 * once.visibility, "every push is a ray");
+    for capacity in ["3", "13"] {
+        let rendering = job("ordered").set("schedule.capacity", capacity).render();
+        assert_same(&rendering, &expected, &format!("gathered, capacity {capacity}"));
+    }
+}
+
 #[test]
 fn a_capacity_that_holds_nothing_is_refused() {
     for (capacity, code) in [("0", "K0107"), ("-2", "K0107"), ("many", "K0106"), ("0.0001", "K0222")] {

@@ -151,6 +151,7 @@ fn probe_library() -> Library {
                                 [stages]\nprobe = { entry = \"probe_weights\", on.done = \"end\" }"
         .parse()
         .expect("the changes are TOML");
+    pipeline.remove("inner");
     pipeline.extend(changes);
     library.sources.add(FileKind::Config, "pipelines/probe.toml", "probe.toml", pipeline.to_string());
     library

@@ -196,9 +196,10 @@ pub struct Stage {
     pub sort: IndexMap<String, Spanned<String>>,
 }
 
-/// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced. Where a kernel
-/// goes round inside, a turn counts as a round from that on in which it took the path: of a megakernel the kinds are those of single
-/// stages, of several kernels in a row only the sum is. Where slots take several paths, rounds are those of the pass.
+/// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced, or by the turn of
+/// an inner loop. Where a kernel goes round inside, a turn counts as a round from that on in which it took the path: of a megakernel
+/// the kinds are those of single stages in flat rounds, of several kernels in a row only the sum is. Where slots take several paths,
+/// rounds are those of the pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RayKind {
@@ -336,9 +337,18 @@ pub struct Schedule {
     /// Paths of a pass for each slot: with more than one, a slot whose path is over takes the next.
     pub regenerate: Spanned<u32>,
     /// Streams resolved by a kernel of their own; the others inline.
-    pub batch: Vec<Spanned<String>>,
+    pub batch: Batch,
     /// Records that each batched stream has room for, per path slot.
     pub capacity: Spanned<f64>,
+}
+
+/// Which streams are resolved by a kernel of their own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Batch {
+    /// These.
+    Streams(Vec<Spanned<String>>),
+    /// All whose kernels push a bounded number of records: `batch = "bounded"`.
+    Bounded,
 }
 
 /// How kernels that lead back to earlier ones are repeated.

@@ -6,7 +6,7 @@ use crate::source::Span;
 use naga::keywords::wgsl::{BUILTIN_IDENTIFIERS, RESERVED};
 
 /// Names that the generated modules declare themselves.
-const GENERATED: [&str; 18] = [
+const GENERATED: [&str; 20] = [
     "Hit",
     "Pass",
     "END",
@@ -20,6 +20,8 @@ const GENERATED: [&str; 18] = [
     "path_sample",
     "pass_seed",
     "path_count",
+    "picture_width",
+    "picture_height",
     "splat",
     "tally_counts",
     "tally_rates",

@@ -1,7 +1,7 @@
 //! The schedule axis and the precision axis.
 
 use super::merge::AxisFile;
-use super::model::{Accumulate, Fuse, LoadAt, Loops, PathOrder, Precision, QueueKind, Real, Schedule};
+use super::model::{Accumulate, Batch, Fuse, LoadAt, Loops, PathOrder, Precision, QueueKind, Real, Schedule};
 use super::section::{Findings, Item, Section};
 use super::tree::Data;
 use crate::diagnostic::Diagnostic;
@@ -60,7 +60,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         }
         None => Some(Spanned { value: 1, span: section.span }),
     };
-    let batch = section.get("batch").and_then(|item| names(&item, findings));
+    let batch = section.get("batch").and_then(|item| batch(&item, findings));
     let capacity = section.require("capacity", "records per path slot in a batched stream: `capacity = 4`", findings);
     let capacity = capacity.and_then(|item| room(&item, findings));
     Some(Schedule {
@@ -75,7 +75,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         load: [LoadAt::Entry, LoadAt::Use][load.unwrap_or_default()],
         regenerate: regenerate?,
         accumulate: [Accumulate::AtomicF32, Accumulate::FixedI64, Accumulate::Racy][accumulate?],
-        batch: batch.unwrap_or_default(),
+        batch: batch.unwrap_or(Batch::Streams(Vec::new())),
         capacity: capacity?,
     })
 }
@@ -143,6 +143,14 @@ fn keys(item: &Item<'_>, findings: &mut Findings) -> Option<Vec<Spanned<String>>
     match &item.node.data {
         Data::Text(text) if text == UNSORTED => Some(Vec::new()),
         _ => names(item, findings),
+    }
+}
+
+/// Names of streams, or the word for as many as possible.
+fn batch(item: &Item<'_>, findings: &mut Findings) -> Option<Batch> {
+    match &item.node.data {
+        Data::Text(text) if text == "bounded" => Some(Batch::Bounded),
+        _ => names(item, findings).map(Batch::Streams),
     }
 }
 

@@ -3,7 +3,7 @@
 use super::encode;
 use super::expression;
 use super::model::{
-    Field, Fuse, Layers, Layout, OPTIONAL, Pipeline, Placed, PlacedField, QueueKind, Schedule, Tally, Variant,
+    Batch, Field, Fuse, Layers, Layout, OPTIONAL, Pipeline, Placed, PlacedField, QueueKind, Schedule, Tally, Variant,
 };
 use super::section::Findings;
 use super::suggest;
@@ -24,8 +24,10 @@ pub fn check(variant: &Variant, findings: &mut Findings) {
     check_sizes(pipeline, findings);
     check_corrections(pipeline, findings);
     check_generated(pipeline, findings);
-    for stream in &variant.schedule.batch {
-        check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
+    if let Batch::Streams(streams) = &variant.schedule.batch {
+        for stream in streams {
+            check_known(("K0218", "stream"), stream, &pipeline.streams, findings);
+        }
     }
     check_groups(variant, findings);
     check_keys(variant, findings);

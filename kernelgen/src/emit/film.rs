@@ -43,7 +43,7 @@ pub(super) fn module(accumulate: Accumulate, layers: &[Layers]) -> String {
         Accumulate::FixedI64 => ("atomic<i64>", FIXED_I64),
         Accumulate::Racy => ("f32", RACY),
     };
-    let pass = if layers.is_empty() { "" } else { "import package::pass::pass_info;\n" };
+    let pass = if layers.is_empty() { "" } else { "import package::pass::{picture_height, picture_width};\n" };
     let mut text = format!(
         "import package::real::{{real, vec3r}};\n\
          import package::control::{{control, CONTROL_REJECTED}};\n{pass}\n\
@@ -64,7 +64,7 @@ fn push_splat(text: &mut String, group: &Layers) {
         "\n/// Adds to a pixel of a layer of `{name}`. An index beyond the last is taken as the last.\n\
          fn {}(index: u32, pixel: u32, value: vec3r) {{\n    \
              let plane = {first}u + min(index, {}u);\n    \
-             splat(plane * pass_info.width * pass_info.height + pixel, value);\n\
+             splat(plane * picture_width * picture_height + pixel, value);\n\
          }}\n",
         function(name),
         size - 1

@@ -88,23 +88,15 @@ impl Frame<'_> {
         for (codec, function) in &access.codecs {
             imports.add(&format!("codec::{codec}"), [function.as_str()]);
         }
-        let mut enqueue = enqueue(&targets, queues, &mut imports);
-        let (mut test, mut condition) = (String::new(), condition);
+        let (mut test, mut condition, mut targets) = (String::new(), condition, targets);
+        let mut taken = String::new();
         if let Some(start) = next {
             test = format!("    let begun = {condition};\n");
             condition = "begun".to_owned();
-            enqueue.push_str(&take_next(start, &targets, queues, &mut imports));
+            taken = take_next(&targets, &mut imports);
+            targets.push((start.to_owned(), "again".to_owned()));
         }
-        let mut fed = targets.iter().map(|(target, _)| target.as_str()).chain(next);
-        if fed.any(|target| queues.is_waited_for_in_slots(target)) {
-            imports.add("queue", ["count_arrivals"]);
-            enqueue.push_str("    count_arrivals(lane);\n");
-        }
-        for stream in gathered {
-            let function = stream::gather_function(stream);
-            imports.add("streams", [function.as_str()]);
-            let _ = writeln!(enqueue, "    {function}(lane);");
-        }
+        let enqueue = taken + &leave(&targets, gathered, queues, &mut imports);
         let loaded = loaded(&instances, access, &mut imports);
         let mut stored = String::new();
         for (number, store) in access.stores.iter().enumerate() {
@@ -201,33 +193,47 @@ fn targets(stage: &WiredStage) -> Vec<(String, String)> {
     tests.collect()
 }
 
-/// A line for every stage that waits for paths.
-fn enqueue(targets: &[(String, String)], queues: &Queues, imports: &mut Imports) -> String {
-    let mut text = String::new();
-    if !targets.is_empty() {
-        text.push('\n');
-    }
+/// Where paths and records go when a kernel is over: those that a workgroup counts together ask for places first, then take them.
+fn leave(targets: &[(String, String)], gathered: &[String], queues: &Queues, imports: &mut Imports) -> String {
+    let (mut asks, mut goes) = (Vec::new(), String::new());
     for (target, wanted) in targets {
         let constant = stage_constant(target);
         imports.add("queue", [constant.as_str()]);
-        let _ = if queues.is_waited_for_in_slots(target) {
-            imports.add("queue", ["wait_for"]);
-            writeln!(text, "    wait_for({constant}, {wanted}, path_id);")
+        let rank = format!("ranks[{}]", asks.len());
+        let (function, line) = if queues.is_waited_for_in_slots(target) {
+            ("wait_for", format!("wait_for({constant}, {wanted}, path_id)"))
+        } else if queues.stands_in(target) {
+            ("stand", format!("stand({constant}, {wanted}, path_id, {rank}, lane)"))
         } else {
-            imports.add("queue", ["enqueue"]);
-            writeln!(text, "    enqueue({constant}, {wanted}, path_id, lane);")
+            ("enqueue", format!("enqueue({constant}, {wanted}, path_id, lane)"))
         };
+        imports.add("queue", [function]);
+        let _ = writeln!(goes, "    {line};");
+        if function != "enqueue" {
+            asks.push(format!("ask_place({constant}, {wanted}, lane)"));
+        }
     }
-    text
+    for stream in gathered {
+        let constant = stream_constant(stream);
+        let (has, gather) = (stream::has_function(stream), stream::gather_function(stream));
+        imports.add("queue", [constant.as_str()]);
+        imports.add("streams", [has.as_str(), gather.as_str()]);
+        let _ = writeln!(goes, "    {gather}(ranks[{}], lane);", asks.len());
+        asks.push(format!("ask_place({constant}, {has}(), lane)"));
+    }
+    if asks.is_empty() {
+        return if goes.is_empty() { goes } else { format!("\n{goes}") };
+    }
+    imports.add("queue", ["ask_place", "take_places"]);
+    format!("\n    let ranks = array<u32, {}>({});\n    take_places(0u, lane);\n{goes}", asks.len(), asks.join(", "))
 }
 
-/// The lines that let a slot whose path goes nowhere wait for the start with the next path.
-fn take_next(start: &str, targets: &[(String, String)], queues: &Queues, imports: &mut Imports) -> String {
+/// The line that gives a slot whose path goes nowhere the next path.
+fn take_next(targets: &[(String, String)], imports: &mut Imports) -> String {
     imports.add("queue", ["take_next_path"]);
     let goes_on: Vec<&str> = targets.iter().map(|(_, wanted)| wanted.as_str()).collect();
     let over = if goes_on.is_empty() { "begun".to_owned() } else { format!("begun && !({})", goes_on.join(" || ")) };
-    let again = enqueue(&[(start.to_owned(), "again".to_owned())], queues, imports);
-    format!("\n    let again = take_next_path({over}, path_id, lane);{again}")
+    format!("\n    let again = take_next_path({over}, path_id, lane);")
 }
 
 /// The kernel of a batched stream's consumer.
@@ -274,6 +280,7 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "again",
         "bin",
         "next",
+        "ranks",
         "round",
         "rays",
         "outcome",

@@ -220,15 +220,13 @@ struct Pass {
     first_sample: u32,
     /// Path slots in use.
     slots: u32,
-    /// Pixels in a row.
-    width: u32,
-    /// Rows.
-    height: u32,
     /// Seed of all random numbers.
     seed: u32,
     /// Paths of the pass.
     paths: u32,
-    unused: u32,
+    unused_0: u32,
+    unused_1: u32,
+    unused_2: u32,
 }
 
 var<uniform> pass_info: Pass;
@@ -236,13 +234,19 @@ var<uniform> pass_info: Pass;
 /// Path slots that the buffers have room for.
 override path_count: u32;
 
+/// Pixels in a row.
+override picture_width: u32;
+
+/// Rows.
+override picture_height: u32;
+
 /// The path slot of this invocation.
 var<private> path_id: u32;
 
 /// Index of the path's pixel, y * width + x. Neighbours in the order of paths are neighbours in a tile of 8 x 8 pixels.
 fn path_pixel() -> u32 {
-    let width = pass_info.width;
-    let height = pass_info.height;
+    let width = picture_width;
+    let height = picture_height;
     let number = path_number() % (width * height);
     let top = number / (8u * width) * 8u;
     let rows = min(8u, height - top);
@@ -265,7 +269,7 @@ fn path_pixel() -> u32 {
 
 /// Number of the path's sample, counted from the first of the whole rendering.
 fn path_sample() -> u32 {
-    return pass_info.first_sample + path_number() / (pass_info.width * pass_info.height);
+    return pass_info.first_sample + path_number() / (picture_width * picture_height);
 }
 
 /// Seed of all random numbers.

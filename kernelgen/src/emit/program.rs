@@ -360,12 +360,13 @@ impl Builder<'_> {
         let parsed = analyze::parse(&linked)?;
         analyze::validate(&parsed, &linked)?;
         self.effects_seen.extend(linked.constants_seen);
-        let uses_path_count = linked.items.iter().any(|(_, item)| item == "path_count");
+        let declares = |name: &&str| linked.items.iter().any(|(_, item)| item == *name);
+        let overrides = plan::OVERRIDES.iter().filter(|name| declares(name)).map(|name| (*name).to_owned()).collect();
         let kernel = Kernel {
             name: name.clone(),
             entry,
             module: linked.text,
-            uses_path_count,
+            overrides,
             bindings: Vec::new(),
             workgroup: draft.workgroup,
             stages: draft.stages.clone(),

@@ -5,6 +5,9 @@ use crate::config::model::QueueKind;
 use crate::plan::EntryWords;
 use std::fmt::Write;
 
+/// Words from one queue's counters to the next, a cache line of 128 bytes: a device adds to one line at a time.
+const STRIDE: u32 = 32;
+
 /// Words of the control buffer before those of the queues, by name; all but the last are counters that the host reads.
 const WORDS: [&str; 8] =
     ["rays_primary", "rays_secondary", "rays_deep", "rays_visibility", "rejected", "overflow", "unfinished", "round"];
@@ -16,7 +19,7 @@ pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
 
 /// The words that say how many entries the kernel of a queue takes.
 pub(super) fn entry_words() -> EntryWords {
-    EntryWords { first: WORDS.len() as u32 + 1, stride: 2 }
+    EntryWords { first: STRIDE + 1, stride: STRIDE }
 }
 
 /// Every queue of the program: one a kernel of the loop, one a batched stream.
@@ -74,6 +77,11 @@ impl Queues {
         self.kind == QueueKind::None || !self.ordered.is_empty()
     }
 
+    /// Whether paths find their place in a stage's queue by those of their workgroup.
+    pub(super) fn stands_in(&self, stage: &str) -> bool {
+        self.kind == QueueKind::Workgroup && !self.is_ordered(stage)
+    }
+
     /// Whether the records that a workgroup pushes to a stream are counted together.
     pub(super) fn gathers(&self) -> bool {
         matches!(self.kind, QueueKind::Workgroup | QueueKind::None)
@@ -86,7 +94,7 @@ impl Queues {
 
     /// The word that counts the paths which slots have taken, behind those of the queues.
     fn taken_word(&self) -> u32 {
-        WORDS.len() as u32 + 2 * self.count()
+        STRIDE * (1 + self.count())
     }
 }
 
@@ -102,17 +110,15 @@ pub(super) fn control_module(queues: &Queues, rounds: u32) -> String {
          const CONTROL_WORDS: u32 = {}u;\n\n\
          /// Rounds after which no path may be alive.\n\
          const ROUNDS: u32 = {rounds}u;\n\n\
-         /// Counters of a pass, then two words a queue: how many wait in it, how many its running kernel takes.\n\
+         /// Counters of a pass, then two words at the head of a line for each queue: how many wait in it, how many its running kernel takes.\n\
          var<storage, read_write> control: array<atomic<u32>>;\n\n\
          /// The word that counts what waits in a queue.\n\
-         fn waiting_word(number: u32) -> u32 {{\n    return {}u + 2u * number;\n}}\n\n\
+         fn waiting_word(number: u32) -> u32 {{\n    return {STRIDE}u * (1u + number);\n}}\n\n\
          /// How many entries wait in a queue.\n\
          fn waiting(number: u32) -> u32 {{\n    return atomicLoad(&control[waiting_word(number)]);\n}}\n\n\
          /// How many entries the kernel of a queue takes.\n\
-         fn running(number: u32) -> u32 {{\n    return atomicLoad(&control[{}u + 2u * number]);\n}}\n",
+         fn running(number: u32) -> u32 {{\n    return atomicLoad(&control[waiting_word(number) + 1u]);\n}}\n",
         queues.control_words(),
-        WORDS.len(),
-        WORDS.len() + 1,
     );
     if queues.regenerates {
         let word = queues.taken_word();
@@ -192,30 +198,33 @@ pub(super) fn queue_module(queues: &Queues) -> String {
     for (stream, number) in queues.streams.iter().zip(queues.stages.len()..) {
         let _ = writeln!(text, "const {}: u32 = {number}u;", stream_constant(stream));
     }
+    let (count, words) = (queues.count(), queues.workgroup.div_ceil(32));
     let _ = write!(
         text,
-        "\n/// Stages with a queue.\n\
-         const STAGE_QUEUES: u32 = {}u;\n\n\
+        "\n/// Queues in all.\n\
+         const QUEUES: u32 = {count}u;\n\n\
          /// Threads of the workgroups that take from queues.\n\
          const WORKGROUP_THREADS: u32 = {}u;\n\n\
-         /// Words with a bit for every invocation of a workgroup.\n\
-         const WORKGROUP_WORDS: u32 = {}u;\n",
-        queues.stages.len(),
+         /// How often a workgroup has 32 invocations.\n\
+         const WORKGROUP_WORDS: u32 = {words}u;\n\n\
+         /// One a queue and 32 invocations of a workgroup.\n\
+         const SHARES: u32 = {}u;\n",
         queues.workgroup,
-        queues.workgroup.div_ceil(32)
+        count * words,
     );
     text.push_str(QUEUE);
-    if kind == QueueKind::Workgroup || !queues.ordered.is_empty() {
-        text.push_str(PLACE_SIDE_BY_SIDE);
+    text.push_str(PLACES);
+    if kind != QueueKind::None {
+        text.push_str(STAND);
     }
-    text.push_str(match kind {
-        QueueKind::Atomic => ENQUEUE_ATOMIC,
-        QueueKind::Subgroup => ENQUEUE_SUBGROUP,
-        QueueKind::Workgroup => ENQUEUE_WORKGROUP,
-        QueueKind::None => TAKES,
-    });
     if queues.waits_in_slots() {
         text.push_str(WAIT);
+    }
+    match kind {
+        QueueKind::Atomic => text.push_str(ENQUEUE_ATOMIC),
+        QueueKind::Subgroup => text.push_str(ENQUEUE_SUBGROUP),
+        QueueKind::Workgroup => {}
+        QueueKind::None => text.push_str(TAKES),
     }
     if !queues.ordered.is_empty() {
         text.push_str(ORDER);
@@ -275,50 +284,53 @@ fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
 }
 ";
 
-const PLACE_SIDE_BY_SIDE: &str = r"
-/// One bit an invocation: which of them go on.
-var<workgroup> survivors: array<atomic<u32>, WORKGROUP_WORDS>;
-/// Where the survivors' places begin.
-var<workgroup> survivors_base: u32;
+/// All invocations of a device on one word would wait for one another: a workgroup counts on its own, and takes places in all queues
+/// at once.
+const PLACES: &str = r"
+/// What comes from each 32 invocations of this workgroup to each queue; then where their places begin.
+var<workgroup> shares: array<atomic<u32>, SHARES>;
 
-/// Appends this path to a queue where `wanted`, with one atomic a workgroup on the control word `counter`; `lane` numbers its
-/// invocations. Neighbours stay neighbours. To be called by all invocations of a workgroup.
-fn place_side_by_side(number: u32, counter: u32, wanted: bool, path: u32, lane: u32) {
-    if lane < WORKGROUP_WORDS {
-        atomicStore(&survivors[lane], 0u);
+/// Asks for a place in a queue where `wanted`; returns the rank of this invocation, `lane` of its workgroup, among 32 neighbours.
+fn ask_place(number: u32, wanted: bool, lane: u32) -> u32 {
+    if !wanted {
+        return 0u;
     }
+    return atomicAdd(&shares[number * WORKGROUP_WORDS + lane / 32u], 1u);
+}
+
+/// Takes places for all that have asked, with one atomic a queue; `counter` is 0 for queues that wait, 1 for one that runs. Neighbours
+/// get places side by side. `lane` numbers the invocations, which must all call it, once.
+fn take_places(counter: u32, lane: u32) {
     workgroupBarrier();
-    if wanted {
-        atomicOr(&survivors[lane / 32u], 1u << (lane % 32u));
-    }
-    workgroupBarrier();
-    if lane == 0u {
+    for (var number = lane; number < QUEUES; number += WORKGROUP_THREADS) {
+        let first = number * WORKGROUP_WORDS;
         var count = 0u;
         for (var word = 0u; word < WORKGROUP_WORDS; word += 1u) {
-            count += countOneBits(atomicLoad(&survivors[word]));
+            count += atomicLoad(&shares[first + word]);
         }
-        survivors_base = 0u;
         if count > 0u {
-            survivors_base = atomicAdd(&control[counter], count);
+            var place = atomicAdd(&control[waiting_word(number) + counter], count);
+            for (var word = 0u; word < WORKGROUP_WORDS; word += 1u) {
+                place += atomicExchange(&shares[first + word], place);
+            }
         }
-    }
-    workgroupBarrier();
-    if wanted {
-        var place = survivors_base + countOneBits(atomicLoad(&survivors[lane / 32u]) & ((1u << (lane % 32u)) - 1u));
-        for (var word = 0u; word < lane / 32u; word += 1u) {
-            place += countOneBits(atomicLoad(&survivors[word]));
-        }
-        queue[number * path_count + place] = path;
     }
     workgroupBarrier();
 }
+
+/// The place that was taken for this invocation.
+fn place_of(number: u32, rank: u32, lane: u32) -> u32 {
+    return atomicLoad(&shares[number * WORKGROUP_WORDS + lane / 32u]) + rank;
+}
 ";
 
-const ENQUEUE_WORKGROUP: &str = r"
-/// Appends this path to a queue where `wanted`, with one atomic a workgroup: later stages find the state of neighbours side by side.
-/// To be called by all invocations of a workgroup.
-fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
-    place_side_by_side(number, waiting_word(number), wanted, path, lane);
+/// Paths stand in queues.
+const STAND: &str = r"
+/// Puts this path into its place of a queue where `wanted`.
+fn stand(number: u32, wanted: bool, path: u32, rank: u32, lane: u32) {
+    if wanted {
+        queue[number * path_count + place_of(number, rank, lane)] = path;
+    }
 }
 ";
 
@@ -327,26 +339,10 @@ const WAIT: &str = r"
 /// The stage that a path waits for in its slot, its number plus one; 0: none.
 var<storage, read_write> waits_for: array<u32>;
 
-/// Paths of this workgroup that begin to wait, by stage.
-var<workgroup> arrivals: array<atomic<u32>, STAGE_QUEUES>;
-
 /// Lets this path wait for a stage where `wanted`.
 fn wait_for(number: u32, wanted: bool, path: u32) {
     if wanted {
         waits_for[path] = number + 1u;
-        atomicAdd(&arrivals[number], 1u);
-    }
-}
-
-/// Adds how many paths of this workgroup begin to wait, with one atomic a stage: all invocations of a device on one word would wait
-/// for one another. `lane` numbers its invocations, which must all call it, once.
-fn count_arrivals(lane: u32) {
-    workgroupBarrier();
-    for (var number = lane; number < STAGE_QUEUES; number += WORKGROUP_THREADS) {
-        let counted = atomicLoad(&arrivals[number]);
-        if counted > 0u {
-            atomicAdd(&control[waiting_word(number)], counted);
-        }
     }
 }
 ";
@@ -370,7 +366,9 @@ fn take_in_order(number: u32, path: u32, lane: u32) {
     if wanted {
         waits_for[path] = 0u;
     }
-    place_side_by_side(number, waiting_word(number) + 1u, wanted, path, lane);
+    let rank = ask_place(number, wanted, lane);
+    take_places(1u, lane);
+    stand(number, wanted, path, rank, lane);
 }
 
 /// Makes the kernel of a queue take what is then put into it, instead of what waits in it.

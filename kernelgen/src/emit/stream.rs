@@ -34,6 +34,11 @@ pub(super) fn room_function(stream: &str) -> String {
     format!("{stream}_room")
 }
 
+/// The WGSL function that says whether an invocation has pushed to a batched stream what has no place yet.
+pub(super) fn has_function(stream: &str) -> String {
+    format!("{stream}_arrives")
+}
+
 /// The WGSL function that stores what a workgroup has pushed to a batched stream, where workgroups gather their records.
 pub(super) fn gather_function(stream: &str) -> String {
     format!("gather_{stream}")
@@ -140,8 +145,8 @@ fn push_at_once(body: &mut String, name: &str, record: &str) {
 /// A place for the records of a workgroup, taken at the end of the kernel: until then an invocation keeps its last record.
 fn push_gathered(imports: &mut Imports, body: &mut String, name: &str, record: &str, stream: &WiredStream) {
     let constant = stream_constant(name);
-    let function = gather_function(name);
-    imports.add("control", ["waiting_word"]);
+    let (has, gather) = (has_function(name), gather_function(name));
+    imports.add("queue", ["place_of"]);
     let mut earlier = String::new();
     if stream.pushes.values().any(|most| *most > 1) {
         earlier = format!(
@@ -155,31 +160,21 @@ fn push_gathered(imports: &mut Imports, body: &mut String, name: &str, record: &
         "\n/// The last record of this invocation.\n\
          var<private> last_{name}: {record};\n\
          /// Whether there is one.\n\
-         var<private> has_{name}: bool;\n\
-         /// How many of this workgroup have one.\n\
-         var<workgroup> {name}_share: atomic<u32>;\n\
-         /// Where their places begin.\n\
-         var<workgroup> {name}_base: u32;\n\n\
+         var<private> has_{name}: bool;\n\n\
          /// Keeps a record until the stream is emptied.\n\
          fn push_{name}(record: {record}) {{\n\
          {earlier}    \
              last_{name} = record;\n    \
              has_{name} = true;\n\
          }}\n\n\
-         /// Stores the last records of this workgroup side by side, with one atomic on the stream's counter. `lane` numbers its\n\
-         /// invocations, which must all call it, once.\n\
-         fn {function}(lane: u32) {{\n    \
-             var rank = 0u;\n    \
+         /// Whether this invocation has a record without a place.\n\
+         fn {has}() -> bool {{\n    \
+             return has_{name};\n\
+         }}\n\n\
+         /// Stores the last record of this invocation in the place that was taken for it.\n\
+         fn {gather}(rank: u32, lane: u32) {{\n    \
              if has_{name} {{\n        \
-                 rank = atomicAdd(&{name}_share, 1u);\n    \
-             }}\n    \
-             workgroupBarrier();\n    \
-             if lane == 0u && atomicLoad(&{name}_share) > 0u {{\n        \
-                 {name}_base = atomicAdd(&control[waiting_word({constant})], atomicLoad(&{name}_share));\n    \
-             }}\n    \
-             workgroupBarrier();\n    \
-             if has_{name} {{\n        \
-                 store_{name}({name}_base + rank, last_{name});\n    \
+                 store_{name}(place_of({constant}, rank, lane), last_{name});\n    \
              }}\n\
          }}\n"
     );

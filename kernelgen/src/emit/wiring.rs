@@ -9,7 +9,7 @@ use super::fusion::{Chain, Fusion};
 use super::room;
 use super::signature::{Signature, signature};
 use crate::analyze::{self, Flow, FlowStage, Leaf, StageFacts};
-use crate::config::model::{RayKind, Stage, Stream, Variant};
+use crate::config::model::{Batch, RayKind, Stage, Stream, Variant};
 use crate::diagnostic::Diagnostic;
 use crate::layout::StateLeaf;
 use crate::link::{self, Constant, Constants, Modules, Root};
@@ -435,13 +435,18 @@ impl Wirer<'_> {
 
     fn wire_stream(&mut self, name: &str, stream: &Stream) -> Result<WiredStream, Vec<Diagnostic>> {
         let variant = self.variant;
-        let batched = variant.schedule.batch.iter().any(|batch| batch.value == name);
         let entry = self.entries.find(&stream.consumer).map_err(|finding| vec![finding])?.clone();
         let bind = |_: &str| Some(name.to_owned());
         let check = |entry: &Entry, signature: &Signature| check_consumer_signature(name, stream, entry, signature);
         let analysed = self.analyse(entry, check, &bind, None)?;
         check_consumer(name, stream, &analysed)?;
-        let pushes = if batched { self.pushes(name)? } else { IndexMap::new() };
+        let pushes = match &variant.schedule.batch {
+            Batch::Streams(streams) if streams.iter().all(|stream| stream.value != name) => None,
+            Batch::Streams(_) => Some(self.pushes(name)?),
+            Batch::Bounded => self.pushes(name).ok(),
+        };
+        let batched = pushes.is_some();
+        let pushes = pushes.unwrap_or_default();
         let most = pushes.values().copied().max().unwrap_or(0);
         check_room(variant, name, stream, most)?;
         Ok(WiredStream {
@@ -475,7 +480,11 @@ impl Wirer<'_> {
     /// K0226: nothing bounds the records that a looping kernel pushes.
     fn uncountable(&self, stream: &str, chain: &Chain, stage: &str) -> Diagnostic {
         let schedule = &self.variant.schedule;
-        let place = schedule.batch.iter().find(|batch| batch.value == stream).map_or(schedule.fuse.span, |it| it.span);
+        let place = match &schedule.batch {
+            Batch::Streams(streams) => streams.iter().find(|named| named.value == stream).map(|named| named.span),
+            Batch::Bounded => None,
+        };
+        let place = place.unwrap_or(schedule.fuse.span);
         let message = format!("kernel `{}` pushes to the batched stream `{stream}` in a loop", chain.entry);
         Diagnostic::error("K0226", message)
             .at(schedule.fuse.span, format!("stage `{stage}` pushes, and its kernel leads back to earlier stages"))

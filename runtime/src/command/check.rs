@@ -9,7 +9,7 @@ use kernelgen::source::FileKind;
 use rayon::prelude::*;
 use runtime::configs::{Axis, Library};
 use runtime::error::Error;
-use runtime::settings::RenderFile;
+use runtime::settings::{RenderFile, Target};
 use runtime::study::Study;
 use serde_json::json;
 use std::path::Path;
@@ -216,7 +216,7 @@ fn study(library: &mut Library, study: &Study) -> Result<Vec<Selection>, Error> 
 }
 
 fn render(library: &mut Library, settings: RenderFile) -> Result<Selection, Error> {
-    settings.with_defaults().selection(library, Effects::new())
+    settings.with_defaults(Target::Gpu).selection(library, Effects::new())
 }
 
 /// All combinations, one axis fixed if asked for. Pipelines without a `start` are there to be extended and left out.

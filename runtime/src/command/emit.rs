@@ -5,6 +5,7 @@ use super::{Failure, print, print_json};
 use clap::Args;
 use kernelgen::Generated;
 use runtime::error::Error;
+use runtime::settings::Target;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +33,7 @@ pub struct Arguments {
 /// User input, refused variants, files that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let settings = input::variant(Some(&arguments.variant))?;
-    let mut settings = arguments.scene.over(arguments.axes.over(settings)).with_defaults();
+    let mut settings = arguments.scene.over(arguments.axes.over(settings)).with_defaults(Target::Gpu);
     let effects = input::effects(&settings)?;
     let generated = input::generate_settings(&mut settings, effects)?;
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from(name(&generated)));

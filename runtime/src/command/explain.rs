@@ -4,6 +4,7 @@ use super::input::{self, SceneArguments, VariantArguments};
 use super::{Failure, print, print_json};
 use clap::Args;
 use runtime::error::Error;
+use runtime::settings::Target;
 use serde_json::json;
 
 /// Shows the layout, the traffic of every kernel, dead fields, and effects kept and dropped.
@@ -30,7 +31,7 @@ pub struct Arguments {
 /// User input, refused variants.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let settings = input::variant(Some(&arguments.variant))?;
-    let mut settings = arguments.scene.over(arguments.axes.over(settings)).with_defaults();
+    let mut settings = arguments.scene.over(arguments.axes.over(settings)).with_defaults(Target::Gpu);
     let effects = input::effects(&settings)?;
     let generated = input::generate_settings(&mut settings, effects)?;
     let report = &generated.report;

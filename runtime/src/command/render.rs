@@ -12,7 +12,7 @@ use runtime::output::save;
 use runtime::picture::Exposure;
 use runtime::render::{Session, Settings, Until};
 use runtime::scene::Accelerator;
-use runtime::settings::{Aov, RenderFile};
+use runtime::settings::{Aov, RenderFile, Target};
 use std::path::{Path, PathBuf};
 
 /// Samples per pixel when nothing says when to stop.
@@ -72,13 +72,13 @@ pub struct Arguments {
 /// User input, refused variants, failed devices.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let earlier = arguments.resume.as_deref().map(input::of_picture).transpose()?;
-    let mut settings = chosen(arguments, earlier.as_ref().map(|(settings, _)| settings))?;
+    let gpu = arguments.device.open()?;
+    let mut settings = chosen(arguments, earlier.as_ref().map(|(settings, _)| settings), Target::of(&gpu))?;
     let until = until(arguments, &settings);
     let output = output(arguments, &settings)?;
 
     let mut scene = input::load_scene(&settings)?;
     let generated = input::generate_settings(&mut settings, scene.effects.clone())?;
-    let gpu = arguments.device.open()?;
     scene.set_accelerator(Accelerator::of(&generated.plan))?;
     let size = scene.size().into();
     settings.size = Some(size);
@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>) -> Result<RenderFile, Error> {
+fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>, target: Target) -> Result<RenderFile, Error> {
     let file = match earlier {
         Some(earlier) => earlier.clone(),
         None => input::variant(arguments.variant.as_deref())?,
@@ -138,7 +138,7 @@ fn chosen(arguments: &Arguments, earlier: Option<&RenderFile>) -> Result<RenderF
     if !arguments.aov.is_empty() {
         settings.aov = arguments.aov.iter().map(|word| layer(word)).collect::<Result<_, _>>()?;
     }
-    Ok(input::with_default_scene(settings.with_defaults()))
+    Ok(input::with_default_scene(settings.with_defaults(target)))
 }
 
 fn layer(word: &str) -> Result<Aov, Error> {

@@ -6,6 +6,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use runtime::error::Error;
 use runtime::render::Progress;
+use runtime::settings::Target;
 use runtime::study::results::{FILE, TABLE};
 use runtime::study::run::REPORT;
 use runtime::study::{Observer, Outcome, Study, run as run_study};
@@ -36,10 +37,11 @@ pub struct Arguments {
 /// User input, failed devices.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Some(study) = &arguments.study else { return tune::run(arguments) };
-    let study = Study::load(study)?;
+    let mut study = Study::load(study)?;
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from(&study.name));
     check_folder(&folder)?;
     let gpu = arguments.device.open()?;
+    study.target = Target::of(&gpu);
     progress::catch_interrupts()?;
     let outcome = run_study(&study, &folder, &gpu, &mut Terminal { bar: ProgressBar::hidden() })?;
     if outcome.stopped {

@@ -6,7 +6,7 @@ use clap::Args;
 use runtime::device::Gpu;
 use runtime::error::Error;
 use runtime::output::make_folder;
-use runtime::settings::{RenderFile, SetValue};
+use runtime::settings::{RenderFile, SetValue, Target};
 use runtime::study::file::file_name;
 use runtime::study::results::write_text;
 use runtime::study::tune::{Candidate, Search, Tuned, tune};
@@ -83,7 +83,7 @@ fn tune_scene(arguments: &Arguments, scene: &str, folder: &Path, gpu: &Gpu) -> R
         ..RenderFile::default()
     };
     let search = Search {
-        settings: settings.with_defaults(),
+        settings: settings.with_defaults(Target::of(gpu)),
         layouts: arguments.layouts.clone(),
         schedules: arguments.schedules.clone(),
         budget: arguments.budget.unwrap_or_default() / arguments.tune.len() as f64,

@@ -4,11 +4,13 @@ use super::*;
 use crate::device::DeviceOptions;
 use crate::film::Sums;
 use kernelgen::config::model::{Accumulate, RayKind};
-use kernelgen::plan::{Access, Binding, Buffer, Counter, EntryWords, Kernel, Needs, SLOT_GRAIN, Size, Step};
+use kernelgen::plan::{Access, Binding, Buffer, Counter, EntryWords, Kernel, Needs, OVERRIDES, SLOT_GRAIN, Size, Step};
 
 const HEADER: &str = "
 override path_count: u32;
-struct Pass { first_pixel: u32, first_sample: u32, active_slots: u32, width: u32, height: u32, seed: u32, unused0: u32, unused1: u32 }
+override picture_width: u32;
+override picture_height: u32;
+struct Pass { first_pixel: u32, first_sample: u32, active_slots: u32, seed: u32, unused: vec4u }
 @group(0) @binding(0) var<storage, read_write> control: array<atomic<u32>>;
 @group(0) @binding(1) var<uniform> pass_info: Pass;
 fn hash(x: u32) -> u32 { var h = x * 747796405u + 2891336453u; h = ((h >> ((h >> 28u) + 4u)) ^ h) * 277803737u; return (h >> 22u) ^ h; }
@@ -18,7 +20,7 @@ fn hash(x: u32) -> u32 { var h = x * 747796405u + 2891336453u; h = ((h >> ((h >>
 const EMIT: &str = "
 fn emit_at(index: u32) {
     let linear = pass_info.first_pixel + index;
-    let pixels = pass_info.width * pass_info.height;
+    let pixels = picture_width * picture_height;
     let sample = pass_info.first_sample + linear / pixels;
     let pixel = linear % pixels;
     let random = f32(hash(hash(pixel) + sample + pass_info.seed) >> 8u) * 0x1p-24;
@@ -36,7 +38,7 @@ fn kernel(name: &str, text: String, bindings: &[(usize, Access)], rays: Option<R
         name: name.to_owned(),
         entry: format!("{name}_main"),
         module: format!("{HEADER}{text}"),
-        uses_path_count: true,
+        overrides: OVERRIDES.map(str::to_owned).to_vec(),
         bindings: bindings
             .map(|(binding, &(buffer, access))| Binding { binding: binding as u32, buffer, access })
             .collect(),

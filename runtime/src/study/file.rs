@@ -5,7 +5,7 @@ use super::interval::Repeat;
 use crate::configs::{Axis, Library, is_path, scene_names, unknown};
 use crate::error::Error;
 use crate::render::Until;
-use crate::settings::{Aov, RenderFile};
+use crate::settings::{Aov, RenderFile, Target};
 use kernelgen::config::model::Effects;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -23,6 +23,9 @@ pub struct Study {
     /// Name of the file without its extension.
     #[serde(skip)]
     pub name: String,
+    /// What it is going to run on.
+    #[serde(skip)]
+    pub target: Target,
     /// Heading of the report.
     pub title: String,
     /// What it shows.
@@ -233,7 +236,7 @@ impl Study {
     /// User input, when an axis names what does not exist.
     pub fn wanted(&self, variant: &Variant, scene: &StudyScene) -> Result<Wanted, Error> {
         let name = RenderFile { scene: Some(scene.name.clone()), ..RenderFile::default() };
-        let wanted = Wanted { seconds: None, settings: name.with_defaults() }
+        let wanted = Wanted { seconds: None, settings: name.with_defaults(self.target) }
             .overlaid(self.defaults.seconds, &self.defaults.settings)
             .overlaid(scene.seconds, &scene.settings)
             .overlaid(variant.seconds, &variant.settings);

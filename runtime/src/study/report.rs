@@ -90,7 +90,7 @@ fn describe_reference(reference: &Reference) -> String {
 fn variants(study: &Study) -> String {
     let columns = ["pipeline", "layout", "schedule", "precision", "set", "about"].map(str::to_owned);
     let row = |variant: &super::file::Variant| {
-        let settings = study.defaults.settings.clone().overlaid(variant.settings.clone()).with_defaults();
+        let settings = study.defaults.settings.clone().overlaid(variant.settings.clone()).with_defaults(study.target);
         let set: Vec<_> = settings.set.iter().map(|(key, value)| format!("{key}={}", value.word())).collect();
         let axes = [settings.pipeline, settings.layout, settings.schedule, settings.precision];
         let mut cells: Vec<String> = axes.into_iter().map(Option::unwrap_or_default).collect();

@@ -300,6 +300,33 @@ fn walks_are_traced_and_scattered_in_one_kernel() {
     assert!(!stored.contains(&"eye.hit.t") && stored.contains(&"eye.position"), "{stored:?}");
 }
 
+/// `bounded` batches what it can: nothing bounds what `trace` and `shade` push when they go round in one kernel.
+#[test]
+fn streams_are_batched_where_their_records_are_bounded() {
+    let has_stream = |set: &[(&str, &str)]| {
+        let plan = generated(&[&[("schedule.batch", "bounded")], set].concat()).plan;
+        plan.buffers.iter().any(|buffer| buffer.role == Role::Stream)
+    };
+    assert!(has_stream(&[]));
+    assert!(!has_stream(&[("schedule.fuse", "walks")]));
+}
+
+/// One atomic a workgroup and queue, for paths and records alike.
+#[test]
+fn a_workgroup_takes_places_in_all_queues_at_once() {
+    let plan = generated(&[("schedule.queue", "workgroup")]).plan;
+    let shade = &kernel(&plan, "shade").module;
+    let expected = "
+    let ranks = array<u32, 2>(ask_place(QUEUE_TRACE, outcome == SCATTERED, lane), \
+        ask_place(STREAM_CONNECTION, connection_arrives(), lane));
+    take_places(0u, lane);
+    stand(QUEUE_TRACE, outcome == SCATTERED, path_id, ranks[0], lane);
+    gather_connection(ranks[1], lane);
+}";
+    assert!(shade.contains(expected), "{shade}");
+    assert!(!shade.contains("fn append("), "no stage pushes twice here");
+}
+
 #[test]
 fn a_slot_whose_path_is_over_takes_the_next() {
     let plan = generated(&[("schedule.regenerate", "4")]).plan;
@@ -309,6 +336,7 @@ fn a_slot_whose_path_is_over_takes_the_next() {
     assert_eq!(names(&plan, body)[..2], ["prepare_emit", "emit"]);
     let expected = "
     let again = take_next_path(begun && !(outcome == SCATTERED), path_id, lane);
+    enqueue(QUEUE_TRACE, outcome == SCATTERED, path_id, lane);
     enqueue(QUEUE_EMIT, again, path_id, lane);
 }";
     let shade = &kernel(&plan, "shade").module;
@@ -427,6 +455,6 @@ fn wrong_inner_loops_are_refused() {
     );
     assert_eq!(code(r#"{ stage = "trace", turns = "1", rounds = "round" }"#), "K0116");
     assert_eq!(code(r#"{ stage = "traces", turns = "1", rounds = "1" }"#), "K0202");
-    assert_eq!(code(r#"{ stage = "trace", turns = "1" }"#), "K0103");
+    assert_eq!(code(r#"{ stage = "trace", turns = "1" }"#), "K0112");
     assert_eq!(code("3"), "K0106");
 }
