@@ -149,6 +149,38 @@ fn texture_without_texels() {
     assert_words(&folder.refusal(&LoadOptions::default(), "scene.gltf"), &["image 0", "cannot decode the image"]);
 }
 
+/// Walks have 8 bits for the number of the medium that they are in; 0 is none.
+#[test]
+fn more_media_than_walks_can_tell_apart() {
+    let with_media = |count: usize| {
+        move |d: &mut Value| {
+            let glass = |number: usize| {
+                json!({ "name": format!("glass {number}"), "pbrMetallicRoughness": { "metallicFactor": 0.0 }, "extensions": {
+                    "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+                    "KHR_materials_volume": { "thicknessFactor": 1.0, "attenuationDistance": 0.5, "attenuationColor": [0.9, 0.8, 0.1] },
+                } })
+            };
+            let materials = d["materials"].as_array_mut().expect("the document has materials");
+            let first = materials.len();
+            materials.extend((1..=count).map(glass));
+            let primitives = d["meshes"][0]["primitives"].as_array_mut().expect("the document has a mesh");
+            let triangle = primitives[0].clone();
+            primitives.extend((first..first + count).map(|material| {
+                let mut triangle = triangle.clone();
+                triangle["material"] = json!(material);
+                triangle
+            }));
+        }
+    };
+    let words = ["256 materials absorb light", "material \"glass 256\" is the first too many", "at most 255"];
+    assert_refused("media", with_media(256), &words);
+    let folder = Folder::new("media-fit");
+    let mut fitting = document();
+    with_media(255)(&mut fitting);
+    folder.write("scene.gltf", fitting.to_string().as_bytes());
+    assert!(folder.load(&LoadOptions::default()).is_ok());
+}
+
 #[test]
 fn accessor_beyond_its_view() {
     assert_refused(
