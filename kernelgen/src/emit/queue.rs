@@ -198,19 +198,19 @@ pub(super) fn queue_module(queues: &Queues) -> String {
     for (stream, number) in queues.streams.iter().zip(queues.stages.len()..) {
         let _ = writeln!(text, "const {}: u32 = {number}u;", stream_constant(stream));
     }
-    let (count, words) = (queues.count(), queues.workgroup.div_ceil(32));
+    let (count, parts) = (queues.count(), queues.workgroup.div_ceil(32));
     let _ = write!(
         text,
         "\n/// Queues in all.\n\
          const QUEUES: u32 = {count}u;\n\n\
          /// Threads of the workgroups that take from queues.\n\
          const WORKGROUP_THREADS: u32 = {}u;\n\n\
-         /// How often a workgroup has 32 invocations.\n\
-         const WORKGROUP_WORDS: u32 = {words}u;\n\n\
-         /// One a queue and 32 invocations of a workgroup.\n\
+         /// Parts of 32 invocations that a workgroup has.\n\
+         const WORKGROUP_PARTS: u32 = {parts}u;\n\n\
+         /// One a queue and part of a workgroup.\n\
          const SHARES: u32 = {}u;\n",
         queues.workgroup,
-        count * words,
+        count * parts,
     );
     text.push_str(QUEUE);
     text.push_str(PLACES);
@@ -287,7 +287,7 @@ fn enqueue(number: u32, wanted: bool, path: u32, lane: u32) {
 /// All invocations of a device on one word would wait for one another: a workgroup counts on its own, and takes places in all queues
 /// at once.
 const PLACES: &str = r"
-/// What comes from each 32 invocations of this workgroup to each queue; then where their places begin.
+/// What comes from each part of this workgroup to each queue; then where its places begin.
 var<workgroup> shares: array<atomic<u32>, SHARES>;
 
 /// Asks for a place in a queue where `wanted`; returns the rank of this invocation, `lane` of its workgroup, among 32 neighbours.
@@ -295,7 +295,7 @@ fn ask_place(number: u32, wanted: bool, lane: u32) -> u32 {
     if !wanted {
         return 0u;
     }
-    return atomicAdd(&shares[number * WORKGROUP_WORDS + lane / 32u], 1u);
+    return atomicAdd(&shares[number * WORKGROUP_PARTS + lane / 32u], 1u);
 }
 
 /// Takes places for all that have asked, with one atomic a queue; `counter` is 0 for queues that wait, 1 for one that runs. Neighbours
@@ -303,15 +303,15 @@ fn ask_place(number: u32, wanted: bool, lane: u32) -> u32 {
 fn take_places(counter: u32, lane: u32) {
     workgroupBarrier();
     for (var number = lane; number < QUEUES; number += WORKGROUP_THREADS) {
-        let first = number * WORKGROUP_WORDS;
+        let first = number * WORKGROUP_PARTS;
         var count = 0u;
-        for (var word = 0u; word < WORKGROUP_WORDS; word += 1u) {
-            count += atomicLoad(&shares[first + word]);
+        for (var part = 0u; part < WORKGROUP_PARTS; part += 1u) {
+            count += atomicLoad(&shares[first + part]);
         }
         if count > 0u {
             var place = atomicAdd(&control[waiting_word(number) + counter], count);
-            for (var word = 0u; word < WORKGROUP_WORDS; word += 1u) {
-                place += atomicExchange(&shares[first + word], place);
+            for (var part = 0u; part < WORKGROUP_PARTS; part += 1u) {
+                place += atomicExchange(&shares[first + part], place);
             }
         }
     }
@@ -320,7 +320,7 @@ fn take_places(counter: u32, lane: u32) {
 
 /// The place that was taken for this invocation.
 fn place_of(number: u32, rank: u32, lane: u32) -> u32 {
-    return atomicLoad(&shares[number * WORKGROUP_WORDS + lane / 32u]) + rank;
+    return atomicLoad(&shares[number * WORKGROUP_PARTS + lane / 32u]) + rank;
 }
 ";
 

@@ -6,15 +6,9 @@
 //! that an emptied stream takes whatever a kernel pushes for all of them, so none ever overflows.
 
 use super::wiring::Wiring;
-use crate::config::MOST_ROUNDS;
 use crate::config::model::Schedule;
 use crate::plan::SLOT_GRAIN;
 use indexmap::IndexMap;
-
-/// Paths that a pass may have for each slot, if one takes so many rounds.
-pub(super) fn paths_per_slot(schedule: &Schedule, rounds: u32) -> u32 {
-    schedule.regenerate.value.min(MOST_ROUNDS / rounds.max(1)).max(1)
-}
 
 /// Records that a batched stream has room for, for every `SLOT_GRAIN` path slots.
 pub(super) fn records(schedule: &Schedule) -> u32 {

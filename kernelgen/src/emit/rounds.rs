@@ -4,10 +4,9 @@
 //! to one vertex of a light walk, a round runs the kernels of that loop again and again until its walks are over. Then all paths
 //! leave it together: the kernels behind it find them side by side, and run as often as there are rounds, not as there are turns.
 
-use super::fusion::Fusion;
-use super::room;
-use crate::config::model::{Loops, Variant};
-use crate::config::{evaluate_inner, evaluate_rounds};
+use super::fusion::{Chain, Fusion};
+use crate::config::model::{Loops, Schedule, Variant};
+use crate::config::{MOST_ROUNDS, evaluate_inner, evaluate_rounds};
 use crate::diagnostic::Diagnostic;
 use std::ops::Range;
 
@@ -40,7 +39,7 @@ impl Rounds {
     /// K0116, as `evaluate_rounds`.
     pub(super) fn new(variant: &Variant, fusion: &Fusion) -> Result<Rounds, Diagnostic> {
         let rounds = evaluate_rounds(&variant.pipeline)?;
-        let paths_per_slot = room::paths_per_slot(&variant.schedule, rounds);
+        let paths_per_slot = paths_per_slot(&variant.schedule, rounds);
         let most = paths_per_slot * rounds;
         let flat = Rounds { most, outer: most, inner: None, paths_per_slot };
         // A slot that takes a further path begins it in any round: its walks are no longer in step with those of others.
@@ -69,10 +68,15 @@ impl Rounds {
     }
 }
 
+/// Paths that a pass may have for each slot, if one takes so many rounds.
+fn paths_per_slot(schedule: &Schedule, rounds: u32) -> u32 {
+    schedule.regenerate.value.min(MOST_ROUNDS / rounds.max(1)).max(1)
+}
+
 /// The kernels from the one that begins with this stage to the last that leads back to it.
 fn kernels_between(fusion: &Fusion, stage: &str) -> Option<Range<usize>> {
     let first = fusion.queued.get_index_of(stage)?;
-    let leads_back = |chain: &super::fusion::Chain| chain.feeds.contains(stage);
+    let leads_back = |chain: &Chain| chain.feeds.contains(stage);
     let last = fusion.queued.values().skip(first).rposition(leads_back)?;
     Some(first..first + last + 1)
 }

@@ -127,7 +127,8 @@ fn push_batched(
     } else {
         push_at_once(body, name, record);
     }
-    push_store_and_load(body, name, record, stream);
+    push_store(body, name, record, stream);
+    push_load(body, name, record, stream);
 }
 
 /// A place a record.
@@ -180,7 +181,7 @@ fn push_gathered(imports: &mut Imports, body: &mut String, name: &str, record: &
     );
 }
 
-fn push_store_and_load(body: &mut String, name: &str, record: &str, stream: &WiredStream) {
+fn push_store(body: &mut String, name: &str, record: &str, stream: &WiredStream) {
     let buffer = buffer_name(name);
     let room = room_function(name);
     let _ = write!(
@@ -196,9 +197,15 @@ fn push_store_and_load(body: &mut String, name: &str, record: &str, stream: &Wir
     for (value, plane) in stream.leaves.iter().flat_map(word_values).zip(0..) {
         let _ = writeln!(body, "    {buffer}[{}] = {value};", plane_address(plane));
     }
+    body.push_str("}\n");
+}
+
+fn push_load(body: &mut String, name: &str, record: &str, stream: &WiredStream) {
+    let buffer = buffer_name(name);
+    let room = room_function(name);
     let _ = write!(
         body,
-        "}}\n\n/// Takes a record out.\n\
+        "\n/// Takes a record out.\n\
          fn load_{name}(index: u32) -> {record} {{\n    \
              let room = {room}();\n    \
              var record: {record};\n"

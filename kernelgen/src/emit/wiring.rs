@@ -516,7 +516,7 @@ impl Wirer<'_> {
     }
 }
 
-/// K0222: not even the fewest slots of a pass find room for the records of a round.
+/// K0222: not even the fewest slots of a pass find room for the records of a kernel.
 fn check_room(variant: &Variant, name: &str, stream: &Stream, most: u32) -> Result<(), Vec<Diagnostic>> {
     let capacity = &variant.schedule.capacity;
     let records = room::records(&variant.schedule);
@@ -524,11 +524,11 @@ fn check_room(variant: &Variant, name: &str, stream: &Stream, most: u32) -> Resu
         return Ok(());
     }
     let least = f64::from((1000 * most).div_ceil(SLOT_GRAIN)) / 1000.0;
-    let message = format!("stream `{name}` has no room for the records of a round");
+    let message = format!("stream `{name}` has no room for the records of a kernel");
     Err(vec![
         Diagnostic::error("K0222", message)
             .at(capacity.span, format!("room for {records} in {SLOT_GRAIN} path slots"))
-            .also(stream.span, format!("one path can push {most} in a round"))
+            .also(stream.span, format!("one path can push {most} in a kernel"))
             .help(format!("write a capacity of {least} or more")),
     ])
 }
