@@ -68,6 +68,19 @@ pub fn file(document: &Value, bytes: &[u8]) -> Vec<u8> {
     container(&[(*b"JSON", &text), (*b"BIN\0", bytes)])
 }
 
+/// The document and the binary chunk of a whole file.
+///
+/// # Panics
+/// When it is none.
+pub fn parts(file: &[u8]) -> (Value, Vec<u8>) {
+    let length = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("four bytes")) as usize;
+    let text = length(12);
+    let document = serde_json::from_slice(&file[20..20 + text]).expect("the first chunk is JSON");
+    let binary = 20 + text;
+    let bytes = if binary < file.len() { file[binary + 8..][..length(binary)].to_vec() } else { Vec::new() };
+    (document, bytes)
+}
+
 fn container(chunks: &[([u8; 4], &[u8])]) -> Vec<u8> {
     let chunks: Vec<_> = chunks.iter().filter(|(_, bytes)| !bytes.is_empty()).collect();
     let total = 12 + chunks.iter().map(|(_, bytes)| 8 + bytes.len()).sum::<usize>();

@@ -78,6 +78,8 @@ pub struct Rendering {
     pub sums: Vec<i64>,
     /// What stages tallied, for each path; empty where they tally nothing.
     pub tallies: Vec<f64>,
+    /// Samples per pixel.
+    pub samples: u32,
 }
 
 impl Job {
@@ -212,9 +214,36 @@ impl Job {
         self.set("accumulate", "fixed_i64")
     }
 
+    /// The layout and the schedule that are best on the adapter, in place of those for a software device.
+    pub fn suited(mut self) -> Job {
+        let suited = RenderFile::default().with_defaults(Target::of(&device()));
+        self.settings = RenderFile { layout: suited.layout, schedule: suited.schedule, ..self.settings };
+        self
+    }
+
     /// Renders.
     #[track_caller]
     pub fn render(&self) -> Rendering {
+        self.run(Some(self.samples), |session| {
+            for batch in 1..=u64::from(BATCHES) {
+                let samples = u64::from(self.samples) * batch / u64::from(BATCHES);
+                session.run(Until::Samples(samples as u32), &mut |_| true).expect("the render runs");
+            }
+        })
+    }
+
+    /// Renders for so many seconds, loading and compilation left out.
+    #[track_caller]
+    pub fn render_for(&self, seconds: f64) -> Rendering {
+        self.run(None, |session| {
+            let until = Until::Seconds(seconds);
+            session.warm_up(until).expect("the passes run");
+            session.run(until, &mut |_| true).expect("the render runs");
+        })
+    }
+
+    #[track_caller]
+    fn run(&self, samples: Option<u32>, render: impl FnOnce(&mut Session)) -> Rendering {
         let mut scene = self.load();
         let mut plan = self.generate(&scene).unwrap_or_else(|refusal| panic!("{refusal}")).plan;
         if self.poisoned {
@@ -232,12 +261,8 @@ impl Job {
         let gpu = device();
         let settings = Settings { size: self.size, seed: self.seed, paths: self.paths };
         let resources = |name: &str| scene.resource(name);
-        let mut session =
-            Session::new(&gpu, &plan, &resources, settings, Some(self.samples)).expect("the plan fits the device");
-        for batch in 1..=u64::from(BATCHES) {
-            let samples = u64::from(self.samples) * batch / u64::from(BATCHES);
-            session.run(Until::Samples(samples as u32), &mut |_| true).expect("the render runs");
-        }
+        let mut session = Session::new(&gpu, &plan, &resources, settings, samples).expect("the plan fits the device");
+        render(&mut session);
         rendering(&session.picture().expect("the picture can be read"))
     }
 
@@ -282,6 +307,7 @@ fn rendering(rendered: &Rendered) -> Rendering {
             Sums::Float(_) => Vec::new(),
         },
         tallies: rendered.totals.tallied.as_ref().map(rates).unwrap_or_default(),
+        samples: rendered.samples_taken,
     }
 }
 
@@ -301,14 +327,23 @@ pub struct BuiltScene {
     sky: Option<PathBuf>,
 }
 
+/// A new temporary folder with this scene in it.
+fn written(scene: &[u8]) -> PathBuf {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    let folder = std::env::temp_dir().join(format!("pathloom-test-{}-{number}", std::process::id()));
+    fs::create_dir_all(&folder).expect("the temporary folder can be written");
+    fs::write(folder.join(BuiltScene::FILE), scene).expect("the scene can be written");
+    folder
+}
+
 impl BuiltScene {
+    /// Name of its file.
+    pub const FILE: &str = "scene.glb";
+
     /// Writes a scene, with a sky or without.
     pub fn new(scene: &SceneBuilder, sky: Option<&Sky>) -> BuiltScene {
-        static NEXT: AtomicU32 = AtomicU32::new(0);
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let folder = std::env::temp_dir().join(format!("pathloom-test-{}-{number}", std::process::id()));
-        fs::create_dir_all(&folder).expect("the temporary folder can be written");
-        fs::write(folder.join("scene.glb"), scene.to_glb()).expect("the scene can be written");
+        let folder = written(&scene.to_glb());
         let sky = sky.map(|sky| {
             let path = folder.join("sky.exr");
             fs::write(&path, sky.to_exr().expect("the sky has texels")).expect("the sky can be written");
@@ -317,9 +352,18 @@ impl BuiltScene {
         BuiltScene { folder, sky }
     }
 
+    /// Writes the bytes of a scene and the text of the `scene.toml` beside it.
+    pub fn of_glb(bytes: &[u8], description: Option<String>) -> BuiltScene {
+        let folder = written(bytes);
+        if let Some(text) = description {
+            fs::write(folder.join("scene.toml"), text).expect("the description can be written");
+        }
+        BuiltScene { folder, sky: None }
+    }
+
     /// A job on this scene.
     pub fn job(&self) -> Job {
-        let mut job = Job::of_file(self.folder.join("scene.glb"));
+        let mut job = Job::of_file(self.folder.join(Self::FILE));
         job.options.env = self.sky.clone();
         job
     }

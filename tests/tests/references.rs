@@ -2,89 +2,28 @@
 //!
 //! Without that folder these tests say so and pass: they check nothing then.
 
-use serde::Deserialize;
-use std::path::{Path, PathBuf};
-use tests::rendering::{Job, Rendering, read_reference};
-use tests::statistics::{Estimate, Pixels, spread, z_scores};
+use tests::references::{Score, expect_errors, reference, scene, shared};
+use tests::rendering::{Job, Rendering};
+use tests::statistics::{Estimate, Pixels};
 
-const BLOCK: usize = 8;
 const ROUNDING: f64 = 1e-3;
-
-#[derive(Deserialize)]
-struct References {
-    reference: Vec<Reference>,
-}
-
-#[derive(Clone, Deserialize)]
-struct Reference {
-    name: String,
-    scene: String,
-    camera: u32,
-    size: [u32; 2],
-    max_edges: u32,
-    spp: u32,
-}
-
-/// The folder of scenes and references, or `None`, with a message that no test runner hides in its summary.
-fn shared() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
-    if folder.join("references/references.toml").is_file() {
-        return Some(folder);
-    }
-    eprintln!("SKIPPED: {} has no references; nothing is checked", folder.display());
-    None
-}
-
-fn reference(shared: &Path, name: &str) -> Reference {
-    let text = std::fs::read_to_string(shared.join("references/references.toml")).expect("references.toml can be read");
-    let all: References = toml::from_str(&text).expect("references.toml is a list of references");
-    all.reference
-        .into_iter()
-        .find(|reference| reference.name == name)
-        .unwrap_or_else(|| panic!("no reference `{name}`"))
-}
-
-fn scene(shared: &Path, name: &str) -> PathBuf {
-    shared.join(format!("scenes/{name}/{name}.glb"))
-}
-
-fn job(shared: &Path, reference: &Reference, shrink: u32) -> Job {
-    Job::of_file(scene(shared, &reference.scene))
-        .camera(&reference.camera.to_string())
-        .edges(reference.max_edges)
-        .size(reference.size[0] / shrink, reference.size[1] / shrink)
-}
 
 /// Block means within the combined standard errors: none beyond 6, at most one in 10,000 beyond 4; the whole image within 0.5 % or its noise.
 #[track_caller]
 fn assert_converges_to(name: &str, pipeline: &str, shrink: u32, samples: u32) {
     let Some(shared) = shared() else { return };
     let reference = reference(&shared, name);
-    let expected = read_reference(&shared.join(format!("references/{name}.exr"))).shrunk(shrink as usize);
-    let mut rendering = job(&shared, &reference, shrink).pipeline(pipeline).samples(samples).render();
+    let expected = reference.image(&shared).shrunk(shrink as usize);
+    let mut rendering = reference.job(&shared, shrink).pipeline(pipeline).samples(samples).render();
     assert_eq!(rendering.rejected, 0, "{name}: rejected contributions");
     expect_errors(&mut rendering.pixels, &expected, reference.spp * shrink * shrink / samples);
     assert_agrees(&rendering, &expected, &format!("{pipeline} on {name}"));
 }
 
-/// Raises standard errors to those that the reference foretells for so many times fewer samples. Where few paths find light, the
-/// error that few samples see of themselves is far too small when they have missed it; the reference has not.
-fn expect_errors(pixels: &mut Pixels, reference: &Pixels, times_fewer: u32) {
-    let growth = (times_fewer as f32).sqrt();
-    for (found, known) in pixels.errors.iter_mut().zip(&reference.errors) {
-        *found = std::array::from_fn(|channel| found[channel].max(growth * known[channel]));
-    }
-}
-
 #[track_caller]
 fn assert_agrees(rendering: &Rendering, expected: &Pixels, name: &str) {
-    let scores = z_scores(&rendering.pixels.block_estimates(BLOCK), &expected.block_estimates(BLOCK), ROUNDING);
-    let spread = spread(&scores);
-    assert!(spread.agrees(), "{name}: blocks {spread:?}");
-    let (found, wanted) = (rendering.pixels.mean_estimate(), expected.mean_estimate());
-    let noise = 4.0 * (found.error.powi(2) + wanted.error.powi(2)).sqrt();
-    let off = (found.mean - wanted.mean).abs();
-    assert!(off < noise.max(0.005 * wanted.mean), "{name}: mean {found:?}, reference {wanted:?}");
+    let score = Score::of(&rendering.pixels, expected, None, ROUNDING);
+    assert!(score.agrees(), "{name}: {score:?}");
 }
 
 #[test]
@@ -129,9 +68,9 @@ fn atrium() {
 fn bottle_light_has_the_mean_of_the_reference() {
     let Some(shared) = shared() else { return };
     let reference = reference(&shared, "bottle_light");
-    let wanted = read_reference(&shared.join("references/bottle_light.exr")).mean_estimate();
+    let wanted = reference.image(&shared).mean_estimate();
     for (pipeline, samples) in [("pt", 256), ("sbdpt", 64)] {
-        let rendering = job(&shared, &reference, 4).pipeline(pipeline).samples(samples).render();
+        let rendering = reference.job(&shared, 4).pipeline(pipeline).samples(samples).render();
         let found = rendering.pixels.mean_estimate();
         assert_eq!(rendering.rejected, 0);
         assert!(found.z(&wanted, 0.01 * wanted.mean).abs() < 5.0, "{pipeline}: {found:?}, reference {wanted:?}");
@@ -176,11 +115,8 @@ fn assert_blocks_within(found: &[Estimate], expected: &[Estimate], share: f64, n
 fn degenerate_geometry_is_rendered_without_rejections() {
     let Some(shared) = shared() else { return };
     let reference = reference(&shared, "odd_degenerate");
-    let rendering = job(&shared, &reference, 4).pipeline("pt").samples(64).render();
+    let rendering = reference.job(&shared, 4).pipeline("pt").samples(64).render();
     assert_eq!(rendering.rejected, 0);
-    let (found, wanted) = (
-        rendering.pixels.mean_estimate(),
-        read_reference(&shared.join("references/odd_degenerate.exr")).mean_estimate(),
-    );
+    let (found, wanted) = (rendering.pixels.mean_estimate(), reference.image(&shared).mean_estimate());
     assert!(found.z(&wanted, 0.01 * wanted.mean).abs() < 4.0, "{found:?}, reference {wanted:?}");
 }
