@@ -4,14 +4,23 @@
 //! Sources are the code of Mitsuba 3.9.1 and of the script that gave it the scenes. They concern eye walks: light walks are not edited.
 
 mod converter;
-mod stages;
+mod holes;
+mod lights;
+mod materials;
+mod normals;
 
 use crate::glb;
 use crate::references::{Reference, scene};
 use crate::rendering::{BuiltScene, Job};
 use std::path::Path;
 
-pub use stages::{EDITS, Edit};
+/// A change of a module: `old`, which stands in it once, is what this renderer does, `new` what the other one does.
+#[derive(Clone, Copy, Debug)]
+struct Edit {
+    module: &'static str,
+    old: &'static str,
+    new: &'static str,
+}
 
 /// A scene as the script converts it for the other renderer.
 ///
@@ -27,7 +36,7 @@ pub fn converted(shared: &Path, reference: &Reference) -> BuiltScene {
 
 /// The `scene.toml` beside a scene, for a copy that lies elsewhere.
 fn description(file: &Path) -> Option<String> {
-    let folder = file.parent()?;
+    let folder = std::path::absolute(file.parent()?).ok()?;
     let text = std::fs::read_to_string(folder.join("scene.toml")).ok()?;
     let mut table: toml::Table = text.parse().expect("scene.toml is TOML");
     table.insert("file".into(), BuiltScene::FILE.into());
@@ -45,5 +54,6 @@ pub fn job(scene: &BuiltScene, reference: &Reference) -> Job {
 
 /// A job with all edits of stages.
 pub fn edited(job: Job) -> Job {
-    EDITS.iter().fold(job, |job, edit| job.edited(edit.module, edit.old, edit.new))
+    let edits = [lights::EDITS, materials::EDITS, normals::EDITS, holes::EDITS].concat();
+    edits.iter().fold(job, |job, edit| job.edited(edit.module, edit.old, edit.new))
 }

@@ -7,11 +7,14 @@
 //! `odd_degenerate` has faces of two colours in one place, which tint the room; the other renderer's own two back ends show different
 //! ones. Its mean alone is compared, in `references.rs`.
 
+use glam::{DVec3, dvec3};
 use std::path::Path;
 use tests::following;
 use tests::mask::Mask;
+use tests::material::Material;
 use tests::references::{Reference, Score, expect_errors, reference, shared};
-use tests::rendering::Job;
+use tests::rendering::{BuiltScene, Job, shipped};
+use tests::scene_builder::{Camera, SceneBuilder};
 
 /// Error that both renderers share by rounding, and that of the errors themselves, as a share of the mean.
 const ROUNDING: f64 = 1e-3;
@@ -143,4 +146,26 @@ fn flight_helmet_without_the_references_conventions_differs() {
 #[test]
 fn lights_suzanne_without_the_references_conventions_differs() {
     assert_agrees_following_alone("lights_suzanne", 64);
+}
+
+#[test]
+fn the_edits_fit_the_stages() {
+    for scene in ["bottle", "light_kinds", "outdoor"] {
+        let job = following::edited(Job::of_file(shipped(scene)).pipeline("pt"));
+        assert_eq!(job.check(), Ok(()), "{scene}");
+    }
+}
+
+#[test]
+fn the_mask_leaves_out_what_is_not_diffuse() {
+    let mut scene = SceneBuilder::new();
+    let wall = scene.material(Material::lambert("wall", [0.5; 3]));
+    let glaze = scene.material(Material::glossy("glaze", [0.5; 3], 1.0));
+    scene.quad(wall, dvec3(-9.0, -9.0, 0.0), DVec3::X * 9.0, DVec3::Y * 18.0);
+    scene.quad(glaze, dvec3(0.0, -9.0, 0.0), DVec3::X * 9.0, DVec3::Y * 18.0);
+    scene.camera("main", Camera { eye: DVec3::Z * 3.0, target: DVec3::ZERO, yfov: 40.0, aspect: 1.0 });
+    let mask = Mask::of(&BuiltScene::new(&scene, None).job().size(16, 16));
+    let expected: Vec<bool> = (0..256).map(|pixel| pixel % 16 < 8).collect();
+    assert_eq!(mask.inside, expected);
+    assert_eq!(mask.blocks(8), [true, false, true, false]);
 }
