@@ -153,6 +153,7 @@ fn the_edits_fit_the_stages() {
     for scene in ["bottle", "light_kinds", "outdoor"] {
         let job = following::edited(Job::of_file(shipped(scene)).pipeline("pt"));
         assert_eq!(job.check(), Ok(()), "{scene}");
+        assert_eq!(job.layout("compact").schedule("ordered").check(), Ok(()), "{scene}");
     }
 }
 

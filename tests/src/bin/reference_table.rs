@@ -39,6 +39,9 @@ fn arguments() -> Result<Arguments, String> {
             _ => return Err(format!("unknown argument `{word}`")),
         }
     }
+    if !chosen.shared.join("references/references.toml").is_file() {
+        return Err(format!("{} has no references; --shared FOLDER says where they are", chosen.shared.display()));
+    }
     if chosen.following && chosen.pipeline != "pt" {
         return Err("--following is for `pt`: light walks do not know these conventions".into());
     }
@@ -46,19 +49,33 @@ fn arguments() -> Result<Arguments, String> {
 }
 
 fn main() -> ExitCode {
-    let arguments = match arguments() {
-        Ok(arguments) => arguments,
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("{message}");
-            return ExitCode::from(2);
+            ExitCode::from(2)
         }
-    };
-    let wanted = |reference: &Reference| arguments.only.as_ref().is_none_or(|only| only.contains(&reference.name));
-    let all = references::all(&arguments.shared).into_iter().filter(wanted);
-    let (exact, approximate): (Vec<_>, Vec<_>) = all.partition(Reference::is_exact);
+    }
+}
+
+fn run() -> Result<(), String> {
+    let arguments = arguments()?;
+    let all = chosen(&arguments)?;
+    let (exact, approximate): (Vec<_>, Vec<_>) = all.into_iter().partition(Reference::is_exact);
     print_table(&arguments, "exact: all blocks", &exact);
     print_table(&arguments, "approximate: blocks of diffuse surfaces", &approximate);
-    ExitCode::SUCCESS
+    Ok(())
+}
+
+/// The references that are asked for.
+fn chosen(arguments: &Arguments) -> Result<Vec<Reference>, String> {
+    let mut all = references::all(&arguments.shared);
+    let Some(only) = &arguments.only else { return Ok(all) };
+    if let Some(unknown) = only.iter().find(|name| all.iter().all(|reference| reference.name != **name)) {
+        return Err(format!("there is no reference `{unknown}`"));
+    }
+    all.retain(|reference| only.contains(&reference.name));
+    Ok(all)
 }
 
 fn print_table(arguments: &Arguments, title: &str, list: &[Reference]) {
