@@ -247,4 +247,6 @@ pub struct Counter {
     pub name: String,
     /// Word index in the control buffer.
     pub word: u32,
+    /// The word counts multiples of two to this power; words of one name add up.
+    pub shift: u32,
 }

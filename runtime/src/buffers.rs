@@ -5,12 +5,16 @@ use crate::error::Error;
 use kernelgen::plan::{Access, Buffer, Plan, Role, SLOT_GRAIN};
 use wgpu::BufferUsages;
 
-/// Path slots on a GPU when not asked otherwise: enough to fill the largest cards and to hide the launches of a round.
-const DEFAULT_PATHS_GPU: u64 = 1 << 22;
+/// Path slots on a GPU when not asked otherwise: so many that the last rounds of a pass, which few paths reach, cost little beside it.
+const DEFAULT_PATHS_GPU: u64 = 1 << 24;
+/// What they may take on a GPU with memory of its own, bytes.
+const DEFAULT_MEMORY_DISCRETE: u64 = 4 << 30;
+/// What they may take on others, bytes.
+const DEFAULT_MEMORY_SHARED: u64 = 1 << 30;
 /// Path slots on a CPU adapter when not asked otherwise.
 const DEFAULT_PATHS_CPU: u64 = 1 << 17;
-/// The most that may be asked for: 32-bit ray counters must survive a pass of a thousand rounds.
-const MOST_PATHS: u64 = 1 << 22;
+/// The most that may be asked for.
+const MOST_PATHS: u64 = 1 << 26;
 /// Slots come in multiples of this.
 const GRAIN: u64 = SLOT_GRAIN as u64;
 
@@ -70,8 +74,7 @@ pub fn choose_path_count(
     wanted: Option<u32>,
     work: Option<u64>,
 ) -> Result<u32, Error> {
-    let default = if gpu.is_cpu() { DEFAULT_PATHS_CPU } else { DEFAULT_PATHS_GPU };
-    let asked = wanted.map_or(default, u64::from);
+    let asked = wanted.map_or_else(|| default_paths(gpu, plan), u64::from);
     if asked == 0 || asked > MOST_PATHS {
         return Err(Error::input(format!("--paths {asked}: between {GRAIN} and {MOST_PATHS} are possible")));
     }
@@ -88,6 +91,16 @@ pub fn choose_path_count(
         }
     }
     u32::try_from(most.max(1) * GRAIN).map_err(|_| Error::failed("more path slots than 32 bits hold"))
+}
+
+fn default_paths(gpu: &Gpu, plan: &Plan) -> u64 {
+    let memory = match gpu.info.device_type {
+        wgpu::DeviceType::Cpu => return DEFAULT_PATHS_CPU,
+        wgpu::DeviceType::DiscreteGpu => DEFAULT_MEMORY_DISCRETE,
+        _ => DEFAULT_MEMORY_SHARED,
+    };
+    let bytes_per_path: u64 = plan.buffers.iter().map(|buffer| buffer.size.per_path).sum();
+    (memory / bytes_per_path.max(1)).clamp(GRAIN, DEFAULT_PATHS_GPU)
 }
 
 /// How many of the path slots one pass may use.

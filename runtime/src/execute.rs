@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::profile::{Measured, Profile, Queries};
 use crate::program::{Command, Extent, commands};
 use bytemuck::{Pod, Zeroable};
-use kernelgen::plan::{Access, Kernel, OVERRIDES, Plan, Role};
+use kernelgen::plan::{Access, Counter, Kernel, OVERRIDES, Plan, Role};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -73,7 +73,7 @@ pub struct Executor {
     arguments: Option<wgpu::Buffer>,
     pass: wgpu::Buffer,
     control: wgpu::Buffer,
-    counters: Vec<(String, u32)>,
+    counters: Vec<Counter>,
     counted: std::ops::Range<u64>,
     spare: Vec<wgpu::Buffer>,
     flying: VecDeque<Flight>,
@@ -100,8 +100,7 @@ impl Executor {
         let by_kernel = pipelines.iter().map(|pipeline| pipeline.seconds).collect();
         let compiled = Compiled { seconds: start.elapsed().as_secs_f64(), by_kernel };
         let arguments = plan.buffers.iter().position(|buffer| buffer.role == Role::Arguments);
-        let counters: Vec<_> = plan.counters.iter().map(|counter| (counter.name.clone(), counter.word)).collect();
-        let words = counters.iter().map(|(_, word)| u64::from(*word));
+        let words = plan.counters.iter().map(|counter| u64::from(counter.word));
         let counted = words.clone().min().unwrap_or(0) * 4..(words.max().unwrap_or(0) + 1) * 4;
         let mut executor = Self {
             gpu: gpu.clone(),
@@ -115,7 +114,7 @@ impl Executor {
             arguments: arguments.and_then(|index| buffers.all[index].clone()),
             pass: buffers.of(plan, Role::Pass)?.clone(),
             control: buffers.of(plan, Role::Control)?.clone(),
-            counters,
+            counters: plan.counters.clone(),
             counted,
             spare: Vec::new(),
             flying: VecDeque::new(),
@@ -234,11 +233,11 @@ impl Executor {
 
     fn counted_in(&self, bytes: &[u8]) -> Counters {
         let mut counters = Counters::default();
-        for (name, word) in &self.counters {
+        for Counter { name, word, shift } in &self.counters {
             let at = (u64::from(*word) * 4 - self.counted.start) as usize;
             let value: u32 = bytemuck::pod_read_unaligned(&bytes[at..at + 4]);
             if let Some(slot) = counters.slot(name) {
-                *slot += u64::from(value);
+                *slot += u64::from(value) << shift;
             }
         }
         counters

@@ -301,9 +301,9 @@ impl Session {
         self.tallies.as_mut().map_or(Ok(()), |tallies| tallies.drain(&self.gpu))
     }
 
-    /// Rates come from all samples so far whenever these are a power of two for each pixel.
+    /// Rates come from all samples so far at each milestone.
     fn renew_rates(&mut self) -> Result<(), Error> {
-        if !self.samples.is_power_of_two() || !self.has_rates() {
+        if next_milestone(self.samples - 1) != self.samples || !self.has_rates() {
             return Ok(());
         }
         self.drain_tallies()?;
@@ -332,8 +332,7 @@ impl Session {
     /// Samples per pixel of the next batch: it ends where the rates of tallies change.
     fn batch_samples(&self, until: Until) -> u32 {
         let wanted = self.wanted_samples(until);
-        let milestone = self.samples.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
-        if self.has_rates() { wanted.min(milestone - self.samples) } else { wanted }
+        if self.has_rates() { wanted.min(next_milestone(self.samples) - self.samples) } else { wanted }
     }
 
     /// A pass of whole samples at most, and an eighth of the work at most.
@@ -513,6 +512,12 @@ pub fn render(
 }
 
 /// The pass of `active` slots that begins `done` slots behind the start of sample `sample`.
+/// Samples per pixel, more than these, at which the rates of tallies change: 1, 8, 64, ... Between them passes are as large as they can
+/// be; closer together, a short render would consist of small ones.
+fn next_milestone(samples: u32) -> u32 {
+    (0..u32::BITS).step_by(3).map(|exponent| 1 << exponent).find(|milestone| *milestone > samples).unwrap_or(u32::MAX)
+}
+
 /// A pass of so many slots at most, and so many paths.
 fn pass_at(settings: &Settings, seed: u32, sample: u32, done: u64, [slots, paths]: [u32; 2]) -> Pass {
     let [width, height] = settings.size;

@@ -9,7 +9,7 @@ use crate::source::Spanned;
 use indexmap::IndexMap;
 
 /// Keys of `[layout]`.
-pub const KEYS: [&str; 8] = ["order", "lane", "dead", "share", "rays", "encode", "tables", "place"];
+pub const KEYS: [&str; 9] = ["order", "lane", "dead", "share", "rays", "ray_lane", "encode", "tables", "place"];
 
 /// The layout; `None` when a required key is missing or refused.
 pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Option<Layout> {
@@ -22,6 +22,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let dead = section.get("dead").and_then(|item| item.word(&["drop", "keep"], findings));
     let share = section.get("share").and_then(|item| item.boolean(findings));
     let rays = section.get("rays").and_then(|item| item.word(&["beside", "apart"], findings));
+    let ray_lane = section.get("ray_lane").and_then(|item| self::lane(&item, findings));
     let encode = encode(&section, findings);
     let tables = tables(&section, findings);
     let place = section.get("place").map(|item| rows(&item, findings)).unwrap_or_default();
@@ -33,6 +34,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         drop_dead: dead != Some(1),
         share: share.unwrap_or_default(),
         rays_apart: rays == Some(1),
+        ray_lane: ray_lane.or(lane)?,
         encode,
         tables,
         place,
@@ -72,7 +74,7 @@ fn lane(item: &Item<'_>, findings: &mut Findings) -> Option<u32> {
     if lane.is_none() {
         let refused = Diagnostic::error("K0107", format!("`{}` cannot be {number}", item.path))
             .at(item.span(), "a lane is loaded as u32, vec2u or vec4u")
-            .help("`lane` is one of 1, 2, 4");
+            .help(format!("`{}` is one of 1, 2, 4", item.name));
         findings.push(refused);
     }
     lane

@@ -226,6 +226,8 @@ pub struct Layout {
     pub share: bool,
     /// Whether rays in flight have a table of their own: what lives only on the way into and out of the kernels that trace it.
     pub rays_apart: bool,
+    /// 32-bit words per access of that table.
+    pub ray_lane: u32,
     /// Codec by quantity (`spectrum`), field (`light.throughput`) or member of a hit (`light.hit.uv`); the closer name wins.
     pub encode: IndexMap<String, Encode>,
     /// Table name to instances; empty means one table named `state`. One that a pipeline may lack ends in `?`.

@@ -176,7 +176,7 @@ fn check_generated(pipeline: &Pipeline, findings: &mut Findings) {
                 .also(*first, "first declared here")
                 .help("give one of them another name");
             findings.push(twice);
-        } else if name == COUNT_RAY {
+        } else if COUNT_RAYS.contains(&name.as_str()) {
             let own = Diagnostic::error("K0115", format!("`{name}` would be declared twice"))
                 .at(span, format!("declares `{name}`, which counts rays in every pipeline"))
                 .help("give the tally another name");
@@ -186,8 +186,8 @@ fn check_generated(pipeline: &Pipeline, findings: &mut Findings) {
     }
 }
 
-/// A function of the generated module `control`.
-const COUNT_RAY: &str = "count_ray";
+/// Functions of the generated module `control`.
+const COUNT_RAYS: [&str; 2] = ["count_ray", "count_rays"];
 
 fn tally_functions(name: &str, tally: &Tally) -> [(String, Span); 3] {
     [format!("count_{name}"), format!("{name}_rate"), format!("{name}_rate_sum")].map(|function| (function, tally.span))

@@ -85,8 +85,8 @@ impl Prepared {
             RayKind::Walk => ("walk_rays_word", "walk_rays_word()"),
             RayKind::Visibility => ("CONTROL_RAYS_VISIBILITY", "CONTROL_RAYS_VISIBILITY"),
         };
-        imports.add("control", ["control", item]);
-        format!("    atomicAdd(&control[{word}], {call});\n")
+        imports.add("control", ["count_rays", item]);
+        format!("    count_rays({word}, {call});\n")
     }
 
     /// The call that sizes the dispatch and gives the number of entries.

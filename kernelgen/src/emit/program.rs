@@ -17,7 +17,7 @@ use crate::config::model::{Accumulate, LoadAt, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
 use crate::layout::Placement;
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
-use crate::plan::{self, Binding, Buffer, Counter, Kernel, Layers, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
+use crate::plan::{self, Binding, Buffer, Kernel, Layers, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
 use indexmap::IndexMap;
 use std::collections::{BTreeMap, BTreeSet};
@@ -389,11 +389,10 @@ impl Builder<'_> {
             };
             Kernel { bindings: bindings.into_iter().filter_map(binding).collect(), ..kernel }
         });
-        let counters = queue::counters().map(|(name, word)| Counter { name: name.to_owned(), word });
         let plan = Plan {
             kernels: kernels.collect(),
             program,
-            counters: counters.collect(),
+            counters: queue::counters().collect(),
             entries: queue::entry_words(),
             tallies,
             layers: self.program.layers.to_vec(),

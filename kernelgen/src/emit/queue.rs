@@ -2,19 +2,25 @@
 
 use super::text::{stage_constant, stream_constant};
 use crate::config::model::QueueKind;
-use crate::plan::EntryWords;
+use crate::plan::{Counter, EntryWords};
 use std::fmt::Write;
 
 /// Words from one queue's counters to the next, a cache line of 128 bytes: a device adds to one line at a time.
 const STRIDE: u32 = 32;
 
-/// Words of the control buffer before those of the queues, by name; all but the last are counters that the host reads.
+/// Words of the control buffer before those of the queues and of the carries, by name; all but the last are counters that the host reads.
 const WORDS: [&str; 8] =
     ["rays_primary", "rays_secondary", "rays_deep", "rays_visibility", "rejected", "overflow", "unfinished", "round"];
+/// Kinds of rays: the first words count them, and as many behind the last how often those ran over.
+const RAY_KINDS: u32 = 4;
 
-/// The counters that the host reads, with their words.
-pub(super) fn counters() -> impl Iterator<Item = (&'static str, u32)> {
-    WORDS.iter().copied().zip(0..).take(WORDS.len() - 1)
+/// The counters that the host reads.
+pub(super) fn counters() -> impl Iterator<Item = Counter> {
+    let counted = WORDS.iter().zip(0..).take(WORDS.len() - 1);
+    let words = counted.clone().map(|(name, word)| Counter { name: (*name).to_owned(), word, shift: 0 });
+    let carry = |word| word + WORDS.len() as u32;
+    let carried = counted.take(RAY_KINDS as usize);
+    words.chain(carried.map(move |(name, word)| Counter { name: (*name).to_owned(), word: carry(word), shift: 32 }))
 }
 
 /// The words that say how many entries the kernel of a queue takes.
@@ -124,8 +130,13 @@ pub(super) fn control_module(queues: &Queues, rounds: u32) -> String {
         let word = queues.taken_word();
         let _ = write!(text, "\n/// Paths of the pass that slots have taken.\nconst CONTROL_TAKEN: u32 = {word}u;\n");
     }
+    let _ = write!(
+        text,
+        "\n/// From the words that count rays to those that count their overflows.\nconst CARRY: u32 = {}u;\n",
+        WORDS.len()
+    );
+    text.push_str(COUNT_RAYS);
     text.push_str(COUNT_WALK_RAYS);
-    text.push_str(COUNT_RAY);
     text.push_str(FUSED);
     text
 }
@@ -141,10 +152,17 @@ fn walk_rays_word() -> u32 {
 }
 ";
 
-const COUNT_RAY: &str = r"
+const COUNT_RAYS: &str = r"
+/// Counts rays: of a pass, more than 32 bits hold.
+fn count_rays(word: u32, rays: u32) {
+    if atomicAdd(&control[word], rays) > 0xffffffffu - rays {
+        atomicAdd(&control[word + CARRY], 1u);
+    }
+}
+
 /// Counts one ray of this invocation.
 fn count_ray(word: u32) {
-    atomicAdd(&control[word], 1u);
+    count_rays(word, 1u);
 }
 ";
 
@@ -174,7 +192,7 @@ fn add_rays(rays: vec4u, lane: u32) {
     if lane < 4u {
         let counted = atomicLoad(&rays_share[lane]);
         if counted > 0u {
-            atomicAdd(&control[CONTROL_RAYS_PRIMARY + lane], counted);
+            count_rays(CONTROL_RAYS_PRIMARY + lane, counted);
         }
     }
 }

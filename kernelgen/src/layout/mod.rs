@@ -209,7 +209,7 @@ fn tables(pipeline: &Pipeline, layout: &Layout, needed: &[StateLeaf]) -> Result<
         name,
         instances,
         order: layout.order,
-        lane: layout.lane,
+        lane: if rays { layout.ray_lane } else { layout.lane },
         lanes: 0,
         rays,
     };

@@ -256,6 +256,7 @@ fn explicit(rows: &[&[&str]]) -> Result<Assigned, Vec<&'static str>> {
         drop_dead: true,
         share: false,
         rays_apart: false,
+        ray_lane: 4,
         encode: IndexMap::new(),
         tables: IndexMap::new(),
         place: rows.iter().map(row).collect(),

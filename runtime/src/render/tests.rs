@@ -73,7 +73,7 @@ fn plan(film: Accumulate) -> Plan {
             if id.x < atomicLoad(&control[1]) { state[id.x] += pass_info.seed; atomicAdd(&control[2], 1u); } }";
     let base = [(0, Access::ReadWrite), (1, Access::Uniform)];
     let with = |more: usize| [base[0], base[1], (more, Access::ReadWrite)];
-    let counter = |name: &str, word| Counter { name: name.to_owned(), word };
+    let counter = |name: &str, word| Counter { name: name.to_owned(), word, shift: 0 };
     Plan {
         buffers: vec![
             buffer("control", Role::Control, 64, 0, 0),
