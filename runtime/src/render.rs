@@ -119,6 +119,7 @@ pub struct Session {
     /// Paths that a pass may have.
     most_paths: u32,
     pass_limit: u32,
+    full_passes: bool,
     samples: u32,
     batches: u32,
     spread_known: bool,
@@ -169,6 +170,7 @@ impl Session {
             slots,
             most_paths: slots * plan.paths_per_slot,
             pass_limit: slots * plan.paths_per_slot,
+            full_passes: false,
             samples: 0,
             batches: 0,
             spread_known: true,
@@ -335,11 +337,18 @@ impl Session {
         if self.has_rates() { wanted.min(next_milestone(self.samples) - self.samples) } else { wanted }
     }
 
-    /// A pass of whole samples at most, and an eighth of the work at most.
+    /// From now on batches of a run for so many seconds are as large as a pass: a short run takes the passes of a long one, with hardly a
+    /// standard error.
+    pub fn take_full_passes(&mut self) {
+        self.full_passes = true;
+    }
+
+    /// A pass of whole samples at most, and an eighth of the work at most unless `take_full_passes` was called.
     fn wanted_samples(&self, until: Until) -> u32 {
         let pixels = self.settings.size[0] * self.settings.size[1];
         let natural = (self.most_paths / pixels).max(1);
         match until {
+            Until::Seconds(_) if self.full_passes => natural,
             Until::Samples(wanted) => {
                 let run = wanted - self.samples_before.min(wanted);
                 natural.min((run / FEWEST_BATCHES).max(1)).min(wanted - self.samples)

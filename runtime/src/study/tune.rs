@@ -222,6 +222,7 @@ impl Trial<'_> {
         let settings = RenderFile { size: Some(size), ..self.search.settings.clone() };
         let resources = |name: &str| scene.resource(name);
         let mut session = Session::new(self.gpu, &generated.plan, &resources, render_settings(&settings), None)?;
+        session.take_full_passes();
         session.warm_up(Until::Seconds(seconds))?;
         let left = (seconds - start.elapsed().as_secs_f64()).max(SHORTEST);
         session.run(Until::Seconds(left), &mut |_| true)?;
