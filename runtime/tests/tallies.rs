@@ -87,16 +87,16 @@ fn everything_is_counted_once_and_the_pilot_not_at_all() {
     assert!(session.tally_totals()[..7].iter().all(|&count| count == 0));
 }
 
-/// The first sample shows the pilot, the second the pilot and the first, the third and fourth those and the second.
+/// The first sample shows the pilot, the second to the eighth the pilot and the first, the ninth those and all seven.
 #[test]
-fn rates_are_those_of_all_samples_up_to_the_last_power_of_two() {
+fn rates_are_those_of_all_samples_up_to_the_last_power_of_eight() {
     let (gpu, plan) = (gpu(), plan("soa", "atomic"));
     let shown = |totals: &Totals| f64::from(totals.mean()[0]) * f64::from(totals.samples);
     let count = |totals: &Totals| totals.tallied.as_ref().expect("counts").counts[7] as f64;
-    let totals: Vec<Totals> = (1..=5).map(|samples| rendered(&gpu, &plan, 4096, samples).totals).collect();
+    let totals: Vec<Totals> = (1..=9).map(|samples| rendered(&gpu, &plan, 4096, samples).totals).collect();
     let pilot = shown(&totals[0]) * f64::from(PILOT_SLOTS);
     assert!((pilot / f64::from(PILOT_SLOTS) - 2.0 / 3.0).abs() < 0.02, "{pilot}");
-    for (samples, rated) in [(2, 1), (3, 2), (4, 2), (5, 4)] {
+    for (samples, rated) in [(2, 1), (3, 1), (4, 1), (8, 1), (9, 8)] {
         let slots = f64::from(PILOT_SLOTS + SIZE[0] * SIZE[1] * rated);
         let expected = (pilot + count(&totals[rated as usize - 1])) / slots;
         let step = shown(&totals[samples - 1]) - shown(&totals[samples - 2]);

@@ -156,6 +156,29 @@ fn sorted_paths_shade_like_their_neighbours() {
     assert!(unsorted > 10 * sorted, "{unsorted} in the order of slots, {sorted} sorted");
 }
 
+/// As if a pass had traced almost as many rays as 32 bits hold before it began.
+const TRACED_BEFORE: u64 = 0xffff_fff0;
+
+fn begin_with_many_rays(plan: &mut Plan) {
+    let primary = plan.counters.iter().find(|counter| counter.name == "rays_primary").expect("rays are counted").word;
+    let begin = plan.kernels.iter_mut().find(|kernel| kernel.name == "begin").expect("passes begin");
+    let (clears, counts) =
+        ("atomicStore(&control[word], 0u);", format!("select(0u, {TRACED_BEFORE}u, word == {primary}u)"));
+    assert!(begin.module.matches(clears).count() == 1, "{}", begin.module);
+    begin.module = begin.module.replacen(clears, &format!("atomicStore(&control[word], {counts});"), 1);
+}
+
+/// By the kernels between the stages, by fused kernels, and where rays are traced on the spot.
+#[test]
+fn rays_beyond_32_bits_are_counted() {
+    for schedule in ["ordered", "walks", "megakernel"] {
+        let job = job("pt").schedule(schedule).samples(8);
+        let primary = job.clone().render().walk_rays[0];
+        let more = job.probed(begin_with_many_rays).render().walk_rays[0] - primary;
+        assert!(more > 0 && more.is_multiple_of(TRACED_BEFORE), "{schedule}: {more} more");
+    }
+}
+
 /// What would go round for ever is given up and counted: too few rounds fail a render, whoever counts them.
 #[test]
 fn a_megakernel_gives_up_paths_that_outlive_the_rounds() {

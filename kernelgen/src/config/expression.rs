@@ -56,7 +56,7 @@ fn evaluate(
     Reader::new(key, text, params).value(most)
 }
 
-/// Rounds of a pass at most: 32-bit counters of rays must survive it.
+/// Rounds of a pass at most: every dispatch of theirs is recorded.
 pub const MOST_ROUNDS: u32 = 1000;
 
 /// Nesting beyond this is no round count but an attack on the stack.

@@ -28,7 +28,7 @@ pub const PRECISION_KEYS: [&str; 1] = ["real"];
 /// More room than the longest pass could use; whatever the number of slots, 32 bits count so many records.
 const MOST_CAPACITY: f64 = 1000.0;
 
-/// Paths that a slot takes in a pass at most: 32-bit counters of rays must survive it.
+/// Paths that a slot takes in a pass at most.
 const MOST_REGENERATED: u32 = 16;
 
 /// What `sort` says where no queue is sorted.

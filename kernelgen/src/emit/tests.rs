@@ -191,6 +191,16 @@ fn every_order_and_lane_generates() {
 }
 
 #[test]
+fn rays_apart_have_lanes_of_their_own_size() {
+    let lanes = |set: &[(&str, &str)]| -> Vec<(String, u32)> {
+        let apart = [&[("layout.lane", "4"), ("layout.rays", "apart")], set].concat();
+        generated(&apart).report.tables.iter().map(|table| (table.name.clone(), table.lane)).collect()
+    };
+    assert_eq!(lanes(&[]), [("state".to_owned(), 4), ("ray".to_owned(), 4)]);
+    assert_eq!(lanes(&[("layout.ray_lane", "1")]), [("state".to_owned(), 4), ("ray".to_owned(), 1)]);
+}
+
+#[test]
 fn every_schedule_generates() {
     for queue in ["atomic", "subgroup"] {
         for accumulate in ["atomic_f32", "fixed_i64", "racy"] {
