@@ -9,23 +9,31 @@ use indexmap::IndexMap;
 /// Evaluates `rounds`: integers, names of u32 parameters, `+ - * /` (rounding down) and parentheses.
 ///
 /// # Errors
-/// K0116 with the place inside the expression: syntax, an unknown or unfit parameter, a result outside of 1 to 2^32-1.
+/// K0116 with the place inside the expression: syntax, an unknown or unfit parameter, a result outside of 1 to 10,000.
 pub fn evaluate_rounds(pipeline: &Pipeline) -> Result<u32, Diagnostic> {
-    evaluate("rounds", &pipeline.rounds, &pipeline.params, u32::MAX)
+    evaluate("rounds", &pipeline.rounds, &pipeline.params, MOST_TURNS)
 }
 
 /// Evaluates what a pipeline declares of its inner loop: its turns in every round, as many numbers as there are rounds then. In `turns`
 /// the number of the round is named `round`, the first 0.
 ///
 /// # Errors
-/// K0116, as `evaluate_rounds`; there are 1000 rounds at most.
+/// K0116, as `evaluate_rounds`; there are 1000 rounds at most, and 10,000 turns in all.
 pub fn evaluate_inner(pipeline: &Pipeline, inner: &Inner) -> Result<Vec<u32>, Diagnostic> {
     let rounds = evaluate("rounds", &inner.rounds, &pipeline.params, MOST_ROUNDS)?;
     let turns = |round| {
         let mut reader = Reader { round: Some(round), ..Reader::new("turns", &inner.turns, &pipeline.params) };
         reader.value(MOST_ROUNDS)
     };
-    (0..rounds).map(turns).collect()
+    let turns = (0..rounds).map(turns).collect::<Result<Vec<u32>, _>>()?;
+    let all: u32 = turns.iter().sum();
+    if all > MOST_TURNS {
+        return Err(Diagnostic::error("K0116", format!("`turns` come to {all} in {rounds} rounds"))
+            .at(inner.turns.span, "the turns of a round")
+            .also(inner.rounds.span, "how many rounds there are")
+            .help(format!("they must come to {MOST_TURNS} at most: every one is recorded")));
+    }
+    Ok(turns)
 }
 
 /// Evaluates the `size` of something that the pipeline declares, written as `rounds`.
@@ -56,8 +64,11 @@ fn evaluate(
     Reader::new(key, text, params).value(most)
 }
 
-/// Rounds of a pass at most: every dispatch of theirs is recorded.
+/// Rounds with an inner loop, and turns in one of them, at most; also those of all paths of a slot.
 pub const MOST_ROUNDS: u32 = 1000;
+
+/// Rounds, or turns in all rounds, at most: every dispatch of theirs is recorded.
+const MOST_TURNS: u32 = 10_000;
 
 /// Nesting beyond this is no round count but an attack on the stack.
 const MAX_DEPTH: u32 = 64;

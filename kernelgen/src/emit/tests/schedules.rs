@@ -454,6 +454,7 @@ fn wrong_inner_loops_are_refused() {
         "0 turns"
     );
     assert_eq!(code(r#"{ stage = "trace", turns = "1", rounds = "round" }"#), "K0116");
+    assert_eq!(code(r#"{ stage = "trace", turns = "1000", rounds = "11" }"#), "K0116", "11,000 turns");
     assert_eq!(code(r#"{ stage = "traces", turns = "1", rounds = "1" }"#), "K0202");
     assert_eq!(code(r#"{ stage = "trace", turns = "1" }"#), "K0112");
     assert_eq!(code("3"), "K0106");
