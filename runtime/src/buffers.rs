@@ -3,7 +3,7 @@
 use crate::device::Gpu;
 use crate::error::Error;
 use kernelgen::plan::{Access, Buffer, Plan, Role, SLOT_GRAIN};
-use wgpu::BufferUsages;
+use wgpu::{BufferUsages, DeviceType};
 
 /// Path slots on a GPU when not asked otherwise: so many that the last rounds of a pass, which few paths reach, cost little beside it.
 const DEFAULT_PATHS_GPU: u64 = 1 << 24;
@@ -74,7 +74,7 @@ pub fn choose_path_count(
     wanted: Option<u32>,
     work: Option<u64>,
 ) -> Result<u32, Error> {
-    let asked = wanted.map_or_else(|| default_paths(gpu, plan), u64::from);
+    let asked = wanted.map_or_else(|| default_paths(gpu.info.device_type, bytes_per_path(plan)), u64::from);
     if asked == 0 || asked > MOST_PATHS {
         return Err(Error::input(format!("--paths {asked}: between {GRAIN} and {MOST_PATHS} are possible")));
     }
@@ -93,14 +93,18 @@ pub fn choose_path_count(
     u32::try_from(most.max(1) * GRAIN).map_err(|_| Error::failed("more path slots than 32 bits hold"))
 }
 
-fn default_paths(gpu: &Gpu, plan: &Plan) -> u64 {
-    let memory = match gpu.info.device_type {
-        wgpu::DeviceType::Cpu => return DEFAULT_PATHS_CPU,
-        wgpu::DeviceType::DiscreteGpu => DEFAULT_MEMORY_DISCRETE,
+fn default_paths(device: DeviceType, bytes_per_path: u64) -> u64 {
+    let memory = match device {
+        DeviceType::Cpu => return DEFAULT_PATHS_CPU,
+        DeviceType::DiscreteGpu => DEFAULT_MEMORY_DISCRETE,
         _ => DEFAULT_MEMORY_SHARED,
     };
-    let bytes_per_path: u64 = plan.buffers.iter().map(|buffer| buffer.size.per_path).sum();
     (memory / bytes_per_path.max(1)).clamp(GRAIN, DEFAULT_PATHS_GPU)
+}
+
+/// Bytes of all buffers that a path slot takes.
+fn bytes_per_path(plan: &Plan) -> u64 {
+    plan.buffers.iter().map(|buffer| buffer.size.per_path).sum()
 }
 
 /// How many of the path slots one pass may use.
@@ -197,4 +201,18 @@ fn resource(
         gpu.queue.write_buffer(&made, whole as u64, &last);
     }
     Ok(Some(made))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_fit_into_the_memory_of_the_device() {
+        assert_eq!(default_paths(DeviceType::DiscreteGpu, 100), 1 << 24);
+        assert_eq!(default_paths(DeviceType::DiscreteGpu, 1024), 1 << 22);
+        assert_eq!(default_paths(DeviceType::IntegratedGpu, 1024), 1 << 20);
+        assert_eq!(default_paths(DeviceType::DiscreteGpu, u64::MAX), GRAIN);
+        assert_eq!(default_paths(DeviceType::Cpu, 1024), 1 << 17);
+    }
 }

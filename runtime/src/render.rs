@@ -520,14 +520,13 @@ pub fn render(
     session.picture()
 }
 
-/// The pass of `active` slots that begins `done` slots behind the start of sample `sample`.
 /// Samples per pixel, more than these, at which the rates of tallies change: 1, 8, 64, ... Between them passes are as large as they can
 /// be; closer together, a short render would consist of small ones.
 fn next_milestone(samples: u32) -> u32 {
     (0..u32::BITS).step_by(3).map(|exponent| 1 << exponent).find(|milestone| *milestone > samples).unwrap_or(u32::MAX)
 }
 
-/// A pass of so many slots at most, and so many paths.
+/// The pass that begins `done` paths behind the start of sample `sample`: of so many slots at most, and so many paths.
 fn pass_at(settings: &Settings, seed: u32, sample: u32, done: u64, [slots, paths]: [u32; 2]) -> Pass {
     let [width, height] = settings.size;
     let pixels = u64::from(width) * u64::from(height);

@@ -160,10 +160,13 @@ fn sorted_paths_shade_like_their_neighbours() {
 const TRACED_BEFORE: u64 = 0xffff_fff0;
 
 fn begin_with_many_rays(plan: &mut Plan) {
-    let primary = plan.counters.iter().find(|counter| counter.name == "rays_primary").expect("rays are counted").word;
+    let word = |name: &str| plan.counters.iter().find(|counter| counter.name == name).expect("rays are counted").word;
+    let (primary, visibility) = (word("rays_primary"), word("rays_visibility"));
     let begin = plan.kernels.iter_mut().find(|kernel| kernel.name == "begin").expect("passes begin");
-    let (clears, counts) =
-        ("atomicStore(&control[word], 0u);", format!("select(0u, {TRACED_BEFORE}u, word == {primary}u)"));
+    let (clears, counts) = (
+        "atomicStore(&control[word], 0u);",
+        format!("select(0u, {TRACED_BEFORE}u, word == {primary}u || word == {visibility}u)"),
+    );
     assert!(begin.module.matches(clears).count() == 1, "{}", begin.module);
     begin.module = begin.module.replacen(clears, &format!("atomicStore(&control[word], {counts});"), 1);
 }
@@ -171,11 +174,17 @@ fn begin_with_many_rays(plan: &mut Plan) {
 /// By the kernels between the stages, by fused kernels, and where rays are traced on the spot.
 #[test]
 fn rays_beyond_32_bits_are_counted() {
-    for schedule in ["ordered", "walks", "megakernel"] {
+    for schedule in ["ordered", "inline", "walks", "megakernel"] {
         let job = job("pt").schedule(schedule).samples(8);
-        let primary = job.clone().render().walk_rays[0];
-        let more = job.probed(begin_with_many_rays).render().walk_rays[0] - primary;
-        assert!(more > 0 && more.is_multiple_of(TRACED_BEFORE), "{schedule}: {more} more");
+        let rays = |job: &Job| {
+            let rendering = job.render();
+            [rendering.walk_rays[0], rendering.visibility]
+        };
+        let few = rays(&job);
+        for (many, few) in rays(&job.probed(begin_with_many_rays)).into_iter().zip(few) {
+            let more = many - few;
+            assert!(more > 0 && more.is_multiple_of(TRACED_BEFORE), "{schedule}: {more} more than {few}");
+        }
     }
 }
 

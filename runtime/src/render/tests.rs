@@ -206,6 +206,21 @@ fn a_warm_up_leaves_no_trace() {
 }
 
 #[test]
+fn a_short_run_can_take_full_passes() {
+    let small = Settings { size: [16, 16], ..settings(4096) };
+    let first_batch = |full: bool| {
+        let plan = plan(Accumulate::AtomicF32);
+        let mut session = Session::new(&gpu(), &plan, &nothing, small, None).expect("a session");
+        if full {
+            session.take_full_passes();
+        }
+        session.run(Until::Seconds(0.0), &mut |_| true).expect("a render");
+        session.picture().expect("a picture").totals.samples
+    };
+    assert_eq!((first_batch(false), first_batch(true)), (1, 16));
+}
+
+#[test]
 fn entries_are_counted_round_by_round() {
     let mut plan = plan(Accumulate::AtomicF32);
     plan.kernels[1].stages = vec!["emit".to_owned()];

@@ -1,8 +1,6 @@
-//! Renders the references at full size and prints the tables of docs/validation.md: `cargo run --release -p tests --bin reference_table`.
-//!
-//! Arguments: `--shared FOLDER` (beside the repository), `--seconds N` a scene (5), `--pipeline NAME` (`pt`), `--only NAME,NAME`,
-//! `--following` for the conventions of the other renderer.
+//! Prints how the references compare, as tables: `cargo run --release -p tests --bin reference_table -- --help`.
 
+use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tests::following;
@@ -13,39 +11,36 @@ use tests::rendering::{Job, Rendering};
 /// Error of f32 sums that both renderers share, as a share of the mean.
 const ROUNDING: f64 = 1e-5;
 
+/// Renders the references at full size and prints the tables of docs/validation.md.
+#[derive(Parser)]
 struct Arguments {
+    /// The folder of scenes and references
+    #[arg(long, value_name = "FOLDER", default_value_os_t = references::default_folder())]
     shared: PathBuf,
+    /// Time a scene, s
+    #[arg(long, value_name = "N", default_value_t = 5.0)]
     seconds: f64,
+    /// The pipeline
+    #[arg(long, value_name = "NAME", default_value = "pt")]
     pipeline: String,
-    only: Option<Vec<String>>,
+    /// These references alone
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    only: Vec<String>,
+    /// With the conventions of the other renderer
+    #[arg(long)]
     following: bool,
 }
 
-fn arguments() -> Result<Arguments, String> {
-    let shared = references::default_folder();
-    let mut chosen = Arguments { shared, seconds: 5.0, pipeline: "pt".into(), only: None, following: false };
-    let mut words = std::env::args().skip(1);
-    while let Some(word) = words.next() {
-        if word == "--following" {
-            chosen.following = true;
-            continue;
+impl Arguments {
+    fn check(&self) -> Result<(), String> {
+        if !self.shared.join("references/references.toml").is_file() {
+            return Err(format!("{} has no references; --shared FOLDER says where they are", self.shared.display()));
         }
-        let value = words.next().ok_or(format!("`{word}` wants a value, or is unknown"))?;
-        match word.as_str() {
-            "--shared" => chosen.shared = value.into(),
-            "--seconds" => chosen.seconds = value.parse().map_err(|error| format!("--seconds {value}: {error}"))?,
-            "--pipeline" => chosen.pipeline = value,
-            "--only" => chosen.only = Some(value.split(',').map(str::to_owned).collect()),
-            _ => return Err(format!("unknown argument `{word}`")),
+        if self.following && self.pipeline != "pt" {
+            return Err("--following is for `pt`: light walks do not know these conventions".into());
         }
+        Ok(())
     }
-    if !chosen.shared.join("references/references.toml").is_file() {
-        return Err(format!("{} has no references; --shared FOLDER says where they are", chosen.shared.display()));
-    }
-    if chosen.following && chosen.pipeline != "pt" {
-        return Err("--following is for `pt`: light walks do not know these conventions".into());
-    }
-    Ok(chosen)
 }
 
 fn main() -> ExitCode {
@@ -59,7 +54,8 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), String> {
-    let arguments = arguments()?;
+    let arguments = Arguments::parse();
+    arguments.check()?;
     let all = chosen(&arguments)?;
     let (exact, approximate): (Vec<_>, Vec<_>) = all.into_iter().partition(Reference::is_exact);
     print_table(&arguments, "exact: all blocks", &exact);
@@ -70,11 +66,11 @@ fn run() -> Result<(), String> {
 /// The references that are asked for.
 fn chosen(arguments: &Arguments) -> Result<Vec<Reference>, String> {
     let mut all = references::all(&arguments.shared);
-    let Some(only) = &arguments.only else { return Ok(all) };
+    let only = &arguments.only;
     if let Some(unknown) = only.iter().find(|name| all.iter().all(|reference| reference.name != **name)) {
         return Err(format!("there is no reference `{unknown}`"));
     }
-    all.retain(|reference| only.contains(&reference.name));
+    all.retain(|reference| only.is_empty() || only.contains(&reference.name));
     Ok(all)
 }
 
