@@ -214,10 +214,12 @@ pub enum Access {
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "snake_case", tag = "step")]
 pub enum Step {
-    /// Enough workgroups for `active` threads, folded to two dimensions: x = min(groups, 65535), y = ceil(groups / 65535).
+    /// Enough workgroups for the slots in use, folded to two dimensions: x = min(groups, 65535), y = ceil(groups / 65535).
     Dispatch {
         /// Index into `Plan::kernels`.
         kernel: usize,
+        /// Path slots that a workgroup takes.
+        slots: u32,
     },
     /// A single workgroup.
     Single {

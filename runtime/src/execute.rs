@@ -68,7 +68,6 @@ struct Flight {
 pub struct Executor {
     gpu: Gpu,
     pipelines: Vec<Pipeline>,
-    workgroups: Vec<u32>,
     program: Vec<Command>,
     arguments: Option<wgpu::Buffer>,
     pass: wgpu::Buffer,
@@ -105,7 +104,6 @@ impl Executor {
         let mut executor = Self {
             gpu: gpu.clone(),
             pipelines,
-            workgroups: plan.kernels.iter().map(|kernel| kernel.workgroup).collect(),
             queries: None,
             warm: false,
             compiled,
@@ -204,8 +202,8 @@ impl Executor {
         compute.set_bind_group(0, &pipeline.bindings, &[]);
         match (command.extent, &self.arguments) {
             (Extent::Indirect(offset), Some(arguments)) => compute.dispatch_workgroups_indirect(arguments, offset),
-            (Extent::Active, _) => {
-                let groups = active.div_ceil(self.workgroups[command.kernel]);
+            (Extent::Active(slots), _) => {
+                let groups = active.div_ceil(slots);
                 compute.dispatch_workgroups(groups.min(WIDEST), groups.div_ceil(WIDEST), 1);
             }
             (Extent::Single, _) | (Extent::Indirect(_), None) => compute.dispatch_workgroups(1, 1, 1),

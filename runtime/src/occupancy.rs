@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn entries_are_added_by_kernel_and_round() {
-        let command = |kernel, round, entries| Command { kernel, round, extent: Extent::Active, entries };
+        let command = |kernel, round, entries| Command { kernel, round, extent: Extent::Active(64), entries };
         let program = [
             command(0, 0, Entries::None),
             command(1, 0, Entries::Active),

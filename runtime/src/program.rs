@@ -5,8 +5,8 @@ use kernelgen::plan::{Plan, Step};
 /// How large a dispatch is.
 #[derive(Clone, Copy, Debug)]
 pub enum Extent {
-    /// An invocation a slot in use.
-    Active,
+    /// Workgroups for the slots in use, each of which takes so many.
+    Active(u32),
     /// One workgroup.
     Single,
     /// As the arguments buffer says at this offset, bytes.
@@ -56,10 +56,10 @@ impl Flattened<'_> {
     fn add(&mut self, steps: &[Step], turn: Option<usize>) {
         for step in steps {
             match step {
-                Step::Dispatch { kernel } => {
+                Step::Dispatch { kernel, slots } => {
                     let works = self.plan.kernels.get(*kernel).is_some_and(|kernel| !kernel.stages.is_empty());
                     let entries = if works { Entries::Active } else { Entries::None };
-                    self.push(turn, *kernel, Extent::Active, entries);
+                    self.push(turn, *kernel, Extent::Active(*slots), entries);
                 }
                 Step::Single { kernel } => self.push(turn, *kernel, Extent::Single, Entries::None),
                 Step::Indirect { kernel, slot } => {

@@ -97,6 +97,13 @@ fn every_schedule() {
     }
 }
 
+/// What an adapter with memory of its own takes by default: inner loops, queues in order, paths that close up.
+#[test]
+fn the_flagship_as_a_gpu_runs_it() {
+    let generated = generate(selection("sbdpt", "compact", "ordered", "f32", false));
+    insta::assert_snapshot!("pipeline_sbdpt_compact_ordered", text_of(&generated));
+}
+
 #[test]
 fn every_precision() {
     for precision in Axis::Precision.names() {

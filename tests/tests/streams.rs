@@ -46,9 +46,10 @@ fn every_order_of_queues_gives_the_same_bits() {
     for pipeline in ["pt", "sbdpt", "sbdpt_seed"] {
         let expected = job(pipeline).render();
         assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
-        for (queue, order) in
-            [("workgroup", "arrival"), ("workgroup", "slot"), ("subgroup", "slot"), ("atomic", "slot")]
-        {
+        let arrival = [("workgroup", "arrival")];
+        let kinds = ["workgroup", "subgroup", "atomic"];
+        let sorted = kinds.into_iter().flat_map(|queue| [(queue, "slot"), (queue, "packed")]);
+        for (queue, order) in arrival.into_iter().chain(sorted) {
             let rendering = job(pipeline).set("schedule.queue", queue).set("schedule.order", order).render();
             assert_same(&rendering, &expected, &format!("{pipeline}, {queue}, {order}"));
             assert_eq!(rendering.tallies, expected.tallies, "{pipeline}, {queue}, {order}: tallies");

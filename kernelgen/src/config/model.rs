@@ -409,6 +409,8 @@ pub enum PathOrder {
     /// By slot, where several stages of a round feed one: their paths would come one stage after the other. A stage with one feeder
     /// finds its paths as that found them.
     Slot,
+    /// As `Slot`, and where all paths meet behind an inner loop they move into slots side by side, with their state.
+    Packed,
 }
 
 /// How the film adds.

@@ -44,6 +44,8 @@ pub(super) enum Entries {
         stage: String,
         /// Whether they are.
         ordered: bool,
+        /// Whether its kernel gives them slots side by side.
+        packed: bool,
     },
     /// All records that wait in a stream.
     Stream(String),
@@ -67,10 +69,18 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
+    /// The statement before anything is handed over.
+    fn noted(&self, imports: &mut Imports) -> String {
+        let Entries::Stage { stage, packed: true, .. } = &self.entries else { return String::new() };
+        let constant = stage_constant(stage);
+        imports.add("queue", ["note_whether_all_wait", constant.as_str()]);
+        format!("    note_whether_all_wait({constant});\n")
+    }
+
     /// The statements that do it.
     fn statements(&self, imports: &mut Imports) -> String {
         let mut text = self.counted(imports);
-        if let Entries::Stage { stage, ordered: true } = &self.entries {
+        if let Entries::Stage { stage, ordered: true, .. } = &self.entries {
             imports.add("queue", ["open_order"]);
             let _ = writeln!(text, "    open_order({});", stage_constant(stage));
         }
@@ -138,6 +148,9 @@ pub(super) fn prepare_kernel(name: &str, counts_round: bool, queues: &[Prepared]
         body.push_str("    atomicAdd(&control[CONTROL_ROUND], 1u);\n");
     }
     for prepared in queues {
+        body.push_str(&prepared.noted(&mut imports));
+    }
+    for prepared in queues {
         body.push_str(&prepared.statements(&mut imports));
     }
     format!(
@@ -158,7 +171,7 @@ pub(super) fn order_kernel(name: &str, stage: &str, workgroup: u32) -> String {
          /// Puts the paths that wait for `{stage}` in the order of their slots.\n\
          @compute @workgroup_size({workgroup})\n\
          fn {name}_main{PARAMETERS} {{\n    \
-             take_in_order({constant}, (group.y * groups.x + group.x) * {workgroup}u + lane, lane);\n\
+             take_in_order({constant}, group.y * groups.x + group.x, lane);\n\
          }}\n"
     )
 }

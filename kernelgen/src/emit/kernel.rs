@@ -28,6 +28,8 @@ pub(super) struct Frame<'a> {
     pub source: Source,
     pub queues: &'a Queues,
     pub access: &'a Access,
+    /// Whether its paths move into slots side by side.
+    pub packs: bool,
     /// The start stage, where a slot whose path is over in this kernel takes the next.
     pub next: Option<&'a str>,
     /// Streams that it may push to and whose records the workgroup counts together.
@@ -78,7 +80,7 @@ pub(super) fn stage_kernel(frame: Frame<'_>, stage: &WiredStage) -> String {
 impl Frame<'_> {
     /// The whole text.
     pub(super) fn fill(self, filling: Filling) -> String {
-        let Frame { kernel, queues, access, next, gathered, .. } = self;
+        let Frame { kernel, queues, access, packs, next, gathered, .. } = self;
         let Filling { mut imports, heading, locals, instances, body, targets, end, counts } = filling;
         let workgroup = queues.workgroup;
         let (condition, path) = self.path(&mut imports);
@@ -90,37 +92,77 @@ impl Frame<'_> {
         }
         let (mut test, mut condition, mut targets) = (String::new(), condition, targets);
         let mut taken = String::new();
-        if let Some(start) = next {
+        if packs || next.is_some() {
             test = format!("    let begun = {condition};\n");
             condition = "begun".to_owned();
+        }
+        if let Some(start) = next {
             taken = take_next(&targets, &mut imports);
             targets.push((start.to_owned(), "again".to_owned()));
         }
         let enqueue = taken + &leave(&targets, gathered, queues, &mut imports);
-        let loaded = loaded(&instances, access, &mut imports);
+        let declared = declared(&instances, &mut imports);
+        let loaded = loaded(access, &mut imports);
         let mut stored = String::new();
         for (number, store) in access.stores.iter().enumerate() {
             let _ = writeln!(stored, "{}        {store}", if number == 0 { "\n" } else { "" });
         }
         let mut numbered = "";
-        if queues.regenerates && self.source == Source::Slots {
+        if queues.numbers_paths() && self.source == Source::Slots {
             imports.add("pass", ["path_numbers"]);
             numbered = "        path_numbers[index] = index;\n";
         }
         let counted = add_tallies(counts, &mut imports);
+        let blocks = if packs {
+            self.moved(&path, &declared, &loaded, &body, &stored, &mut imports)
+        } else {
+            let declared = indented(&declared);
+            let gap = if declared.is_empty() { "" } else { "\n" };
+            format!(
+                "    if {condition} {{\n        path_id = {path};\n{numbered}{gap}{declared}{loaded}\n{body}{stored}    }}\n"
+            )
+        };
         format!(
             "{imports}\n\
              /// {heading} of a path: {} bytes of state in, {} out.\n\
              @compute @workgroup_size({workgroup})\n\
              fn {kernel}_main{PARAMETERS} {{\n    \
                  let index = (group.y * groups.x + group.x) * {workgroup}u + lane;\n\
-             {test}{locals}    \
-                 if {condition} {{\n        \
-                     path_id = {path};\n\
-             {numbered}{loaded}\n{body}{stored}    \
-                 }}\n\
-             {enqueue}{end}{counted}}}\n",
+             {test}{locals}{blocks}{enqueue}{end}{counted}}}\n",
             access.load_bytes, access.store_bytes
+        )
+    }
+
+    /// Loads and the body, then stores in the slot in which the path goes on. In between all of the workgroup wait for one another: a
+    /// path may take the slot of a neighbour.
+    fn moved(
+        self,
+        path: &str,
+        declared: &str,
+        loaded: &str,
+        body: &str,
+        stored: &str,
+        imports: &mut Imports,
+    ) -> String {
+        let constant = stage_constant(self.entry);
+        imports.add("pass", ["path_numbers"]);
+        imports.add("queue", ["packed_slot"]);
+        let mut locals = String::new();
+        for local in &self.access.locals {
+            let _ = writeln!(locals, "    {local}");
+        }
+        format!(
+            "{declared}{locals}    \
+                 var path_taken = 0u;\n    \
+                 if begun {{\n        \
+                     path_id = {path};\n        \
+                     path_taken = path_numbers[path_id];\n\
+             {loaded}\n{body}    }}\n\n    \
+                 storageBarrier();\n    \
+                 if begun {{\n        \
+                     path_id = packed_slot({constant}, index, lane);\n        \
+                     path_numbers[path_id] = path_taken;\n\
+             {stored}    }}\n"
         )
     }
 
@@ -148,16 +190,24 @@ impl Frame<'_> {
     }
 }
 
-/// The instances, with what is loaded into them.
-fn loaded(instances: &IndexMap<String, String>, access: &Access, imports: &mut Imports) -> String {
+/// The instances.
+fn declared(instances: &IndexMap<String, String>, imports: &mut Imports) -> String {
     let mut text = String::new();
-    if !instances.is_empty() {
-        text.push('\n');
-    }
     for (instance, record) in instances {
         imports.add("state", [record.as_str()]);
-        let _ = writeln!(text, "        var {instance}: {record};");
+        let _ = writeln!(text, "    var {instance}: {record};");
     }
+    text
+}
+
+/// Lines one level deeper.
+fn indented(text: &str) -> String {
+    text.lines().map(|line| format!("    {line}\n")).collect()
+}
+
+/// What is loaded into the instances.
+fn loaded(access: &Access, imports: &mut Imports) -> String {
+    let mut text = String::new();
     for load in &access.loads {
         let _ = writeln!(text, "        {load}");
     }
@@ -292,6 +342,7 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "state",
         "arguments",
         "path_count",
+        "path_taken",
         "enqueue",
         "running",
         "pass_info",

@@ -61,6 +61,8 @@ fn address(table: &Table) -> String {
 /// The loads and stores of one kernel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Access {
+    /// Variables of a kernel whose paths change their slots: words that it loads before and stores after.
+    pub locals: Vec<String>,
     /// Statements that fill the instances.
     pub loads: Vec<String>,
     /// Statements that write them back.
@@ -94,16 +96,17 @@ impl Access {
 }
 
 /// The statements that move a kernel's leaves between tables and instances; `late` are leaves to be loaded later, by the stages that
-/// use them.
+/// use them. A kernel that `carries` takes along all that lives on, also what it does not touch.
 pub(super) fn access(
     placement: &Placement,
     traffic: &KernelTraffic,
     late: &BTreeMap<BTreeSet<String>, BTreeSet<Leaf>>,
+    carries: bool,
 ) -> Access {
     let is_late = |leaf: &Leaf| late.values().any(|leaves| leaves.contains(leaf));
     let first = traffic.loads.iter().filter(|leaf| !is_late(leaf)).cloned().collect();
     let traffic = KernelTraffic { loads: first, ..traffic.clone() };
-    let memory = Memory { placement, traffic: &traffic, words: words(placement) };
+    let memory = Memory { placement, traffic: &traffic, words: words(placement), carries };
     let mut access = Access::default();
     let loaded = memory.load_lanes(&mut access);
     memory.fill_leaves(&loaded, &mut access);
@@ -117,7 +120,7 @@ pub(super) fn access(
 
 fn push_late(placement: &Placement, stages: &BTreeSet<String>, leaves: &BTreeSet<Leaf>, access: &mut Access) {
     let traffic = KernelTraffic { loads: leaves.clone(), ..KernelTraffic::default() };
-    let memory = Memory { placement, traffic: &traffic, words: words(placement) };
+    let memory = Memory { placement, traffic: &traffic, words: words(placement), carries: false };
     let mut own = Access::default();
     let loaded = memory.load_lanes(&mut own);
     memory.fill_leaves(&loaded, &mut own);
@@ -157,6 +160,8 @@ struct Memory<'a> {
     placement: &'a Placement,
     traffic: &'a KernelTraffic,
     words: BTreeMap<Word, Vec<Part<'a>>>,
+    /// Whether what lives on is stored elsewhere than where it was loaded.
+    carries: bool,
 }
 
 /// Lanes read as a whole, and the names of words in registers.
@@ -187,11 +192,12 @@ impl Memory<'_> {
         ((table, word / lane), (word % lane) as usize)
     }
 
-    /// Words that the kernel needs in registers: of loaded leaves, and those it stores a part of while the rest stays live.
+    /// Words that the kernel needs in registers: of loaded leaves, and those it stores a part of while the rest stays live; of all that
+    /// stay live where it carries them.
     fn needed_words(&self) -> BTreeSet<Word> {
         let needs = |parts: &Vec<Part<'_>>| {
             let loaded = parts.iter().any(|part| self.traffic.loads.contains(part.leaf));
-            loaded || (self.stores_any(parts) && self.keeps_any(parts))
+            loaded || ((self.carries || self.stores_any(parts)) && self.keeps_any(parts))
         };
         self.words.iter().filter(|(_, parts)| needs(parts)).map(|(word, _)| *word).collect()
     }
@@ -221,12 +227,13 @@ impl Memory<'_> {
             match needed.as_slice() {
                 [(word, component)] if table.lane > 1 => {
                     let component = COMPONENTS[*component];
-                    access.loads.push(format!("let {local}_{component} = {source}.{component};"));
+                    let ty = lane_type(1);
+                    self.push_load(&format!("{local}_{component}"), &ty, &format!("{source}.{component}"), access);
                     access.load_bytes += 4;
                     loaded.words.insert(*word, format!("{local}_{component}"));
                 }
                 _ => {
-                    access.loads.push(format!("let {local} = {source};"));
+                    self.push_load(&local, &lane_type(table.lane), &source, access);
                     access.load_bytes += 4 * table.lane;
                     for (word, component) in needed {
                         let name = match table.lane {
@@ -241,6 +248,15 @@ impl Memory<'_> {
             access.buffers.insert(buffer);
         }
         loaded
+    }
+
+    fn push_load(&self, local: &str, ty: &str, source: &str, access: &mut Access) {
+        if self.carries {
+            access.locals.push(format!("var {local}: {ty};"));
+            access.loads.push(format!("{local} = {source};"));
+        } else {
+            access.loads.push(format!("let {local} = {source};"));
+        }
     }
 
     fn fill_leaves(&self, loaded: &Loaded, access: &mut Access) {
@@ -306,7 +322,7 @@ impl Memory<'_> {
         let lanes: BTreeSet<Lane> = self
             .words
             .iter()
-            .filter(|(_, parts)| self.stores_any(parts))
+            .filter(|(_, parts)| self.stores_any(parts) || (self.carries && self.keeps_any(parts)))
             .map(|(word, _)| self.lane_of(*word).0)
             .collect();
         for lane in lanes {
@@ -323,7 +339,7 @@ impl Memory<'_> {
         let first = lane.1 * table.lane;
         let stores: Vec<WordStore> =
             (first..first + table.lane).map(|word| self.word_store((lane.0, word), loaded)).collect();
-        let values = stores.iter().filter(|store| matches!(store, WordStore::Value(_))).count();
+        let values = stores.iter().filter(|store| self.new_value(store).is_some()).count();
         let lost = stores.iter().any(|store| matches!(store, WordStore::Keep(None)));
         if !lost && 2 * values >= stores.len() {
             let value = self.lane_value(lane, &stores);
@@ -332,10 +348,19 @@ impl Memory<'_> {
             return;
         }
         for (store, component) in stores.iter().zip(COMPONENTS) {
-            if let WordStore::Value(value) = store {
+            if let Some(value) = self.new_value(store) {
                 access.stores.push(format!("{target}.{component} = {value};"));
                 access.store_bytes += 4;
             }
+        }
+    }
+
+    /// What has to be stored, if anything: what is new, and where words are carried also what stays.
+    fn new_value<'s>(&self, store: &'s WordStore) -> Option<&'s str> {
+        match store {
+            WordStore::Value(value) => Some(value),
+            WordStore::Keep(Some(value)) if self.carries => Some(value),
+            _ => None,
         }
     }
 

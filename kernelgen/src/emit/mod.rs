@@ -175,6 +175,7 @@ fn add_state_modules(
     rounds: u32,
 ) {
     let texts = [
+        ("pass", modules::pass(queues.numbers_paths())),
         ("control", queue::control_module(queues, rounds)),
         ("next", chain::module(wiring)),
         ("queue", queue::queue_module(queues)),
@@ -192,11 +193,15 @@ fn queues(wiring: &Wiring, variant: &Variant, rounds: &Rounds) -> Queues {
     let batched = wiring.streams.iter().filter(|(_, stream)| stream.batched);
     let stages: Vec<String> = wiring.fusion.queued.keys().cloned().collect();
     let kind = variant.schedule.queue;
-    let sorts = variant.schedule.order == PathOrder::Slot && kind != QueueKind::None;
+    let sorts = variant.schedule.order != PathOrder::Arrival && kind != QueueKind::None;
     let has_key = |stage: &String| wiring.stages.get(stage).is_some_and(|stage| stage.key.is_some());
     let mixed = |stage: &&String| sorts && rounds.mixes(&wiring.fusion, stage) && !has_key(stage);
+    let ordered: Vec<String> = stages.iter().filter(mixed).cloned().collect();
+    let packs = variant.schedule.order == PathOrder::Packed;
+    let met = |stage: &&String| packs && rounds.is_beside_inner(&wiring.fusion, stage);
     Queues {
-        ordered: stages.iter().filter(mixed).cloned().collect(),
+        packed: ordered.iter().filter(met).cloned().collect(),
+        ordered,
         stages,
         streams: batched.map(|(name, _)| name.clone()).collect(),
         kind,

@@ -97,7 +97,8 @@ impl Builder<'_> {
         let body = self.round(&consumers);
         let left: Vec<Prepared> =
             consumers.keys().map(|stream| self.prepared_stream(stream, Entries::Stream(stream.clone()))).collect();
-        let mut steps = vec![Step::Single { kernel: begin }, Step::Dispatch { kernel: first }];
+        let mut steps =
+            vec![Step::Single { kernel: begin }, Step::Dispatch { kernel: first, slots: program.queues.workgroup }];
         if !body.is_empty() {
             let rounds = if fusion.is_repeated() { program.rounds.outer } else { 1 };
             steps.push(Step::Loop { turns: vec![rounds], body });
@@ -179,8 +180,9 @@ impl Builder<'_> {
 
     fn prepared_stage(&self, stage: &str) -> Prepared {
         let rays = self.rays(&self.program.wiring.fusion.queued[stage]);
-        let ordered = self.program.queues.is_ordered(stage);
-        Prepared { entries: Entries::Stage { stage: stage.to_owned(), ordered }, rays }
+        let queues = self.program.queues;
+        let (ordered, packed) = (queues.is_ordered(stage), queues.is_packed(stage));
+        Prepared { entries: Entries::Stage { stage: stage.to_owned(), ordered, packed }, rays }
     }
 
     /// What all rays of a kernel are counted as, whoever counts by how many paths it takes; several stages count by themselves.
@@ -237,9 +239,10 @@ impl Builder<'_> {
         let Program { queues, placement, .. } = *self.program;
         let name = format!("count_keys_{stage}");
         let traffic = KernelTraffic { loads: key.reads.keys().cloned().collect(), ..KernelTraffic::default() };
-        let access = memory::access(placement, &traffic, &BTreeMap::new());
+        let access = memory::access(placement, &traffic, &BTreeMap::new(), false);
         let (kernel, source) = (name.as_str(), Source::Queue);
-        let frame = Frame { kernel, entry: stage, source, queues, access: &access, next: None, gathered: &[] };
+        let (packs, next, gathered) = (false, None, [].as_slice());
+        let frame = Frame { kernel, entry: stage, source, queues, access: &access, packs, next, gathered };
         let text = sort::count_kernel(frame, key);
         let (workgroup, load_bytes) = (queues.workgroup, access.load_bytes);
         self.compile(Draft { name, text, workgroup, load_bytes, ..Draft::default() })
@@ -259,7 +262,7 @@ impl Builder<'_> {
         let name = format!("order_{stage}");
         let workgroup = self.program.queues.workgroup;
         let kernel = self.housekeeping(&name, housekeeping::order_kernel(&name, stage, workgroup), workgroup);
-        Step::Dispatch { kernel }
+        Step::Dispatch { kernel, slots: queue::order_block(workgroup) }
     }
 
     fn housekeeping(&mut self, name: &str, text: String, workgroup: u32) -> usize {
@@ -270,13 +273,14 @@ impl Builder<'_> {
     fn stages(&mut self, chain: &Chain, source: Source) -> usize {
         let Program { wiring, queues, liveness, .. } = *self.program;
         let entry = chain.entry.as_str();
+        let packs = source == Source::Queue && queues.is_packed(entry);
         let access = match liveness.kernels.get(entry) {
             Some(traffic) => {
                 let late = match self.program.variant.schedule.load {
                     LoadAt::Use => chain::late_leaves(wiring, chain, traffic),
                     LoadAt::Entry => BTreeMap::new(),
                 };
-                memory::access(self.program.placement, traffic, &late)
+                memory::access(self.program.placement, traffic, &late, packs)
             }
             None => Access::default(),
         };
@@ -284,7 +288,7 @@ impl Builder<'_> {
         let kernel = if starts_again { format!("{entry}_first") } else { entry.to_owned() };
         let next = (queues.regenerates && chain.ends).then_some(wiring.fusion.start.entry.as_str());
         let gathered = &self.gathered(entry);
-        let frame = Frame { kernel: &kernel, entry, source, queues, access: &access, next, gathered };
+        let frame = Frame { kernel: &kernel, entry, source, queues, access: &access, packs, next, gathered };
         let text = match wiring.stages.get(entry) {
             Some(stage) if !chain.is_fused() => kernel::stage_kernel(frame, stage),
             _ => chain::chain_kernel(frame, wiring, chain),

@@ -28,6 +28,14 @@ pub(super) fn entry_words() -> EntryWords {
     EntryWords { first: STRIDE + 1, stride: STRIDE }
 }
 
+/// Slots that an invocation looks at to put paths in order.
+const ORDER_TURNS: u32 = 8;
+
+/// Slots that a workgroup of so many threads puts in order.
+pub(super) fn order_block(workgroup: u32) -> u32 {
+    ORDER_TURNS * workgroup
+}
+
 /// Every queue of the program: one a kernel of the loop, one a batched stream.
 #[derive(Clone, Debug)]
 pub(super) struct Queues {
@@ -35,6 +43,8 @@ pub(super) struct Queues {
     pub stages: Vec<String>,
     /// Those of them that take their paths in the order of slots.
     pub ordered: Vec<String>,
+    /// Those of them whose kernels give their paths slots side by side.
+    pub packed: Vec<String>,
     /// Batched streams.
     pub streams: Vec<String>,
     /// How a path finds its place; with `None`, paths are marked instead.
@@ -48,8 +58,8 @@ pub(super) struct Queues {
 impl Queues {
     /// No queue.
     pub(super) fn none(workgroup: u32) -> Queues {
-        let (stages, ordered, streams) = (Vec::new(), Vec::new(), Vec::new());
-        Queues { stages, ordered, streams, kind: QueueKind::None, regenerates: false, workgroup }
+        let (stages, ordered, packed, streams) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Queues { stages, ordered, packed, streams, kind: QueueKind::None, regenerates: false, workgroup }
     }
 
     /// Queues in all.
@@ -71,6 +81,16 @@ impl Queues {
     /// Whether a stage takes its paths in the order of slots.
     pub(super) fn is_ordered(&self, stage: &str) -> bool {
         self.ordered.iter().any(|name| name == stage)
+    }
+
+    /// Whether the paths of a stage's kernel move into slots side by side.
+    pub(super) fn is_packed(&self, stage: &str) -> bool {
+        self.packed.iter().any(|name| name == stage)
+    }
+
+    /// Whether slots know the numbers of their paths, which do not follow from theirs.
+    pub(super) fn numbers_paths(&self) -> bool {
+        self.regenerates || !self.packed.is_empty()
     }
 
     /// Whether paths wait for a stage in their slots, not in its queue.
@@ -116,7 +136,7 @@ pub(super) fn control_module(queues: &Queues, rounds: u32) -> String {
          const CONTROL_WORDS: u32 = {}u;\n\n\
          /// Rounds after which no path may be alive.\n\
          const ROUNDS: u32 = {rounds}u;\n\n\
-         /// Counters of a pass, then two words at the head of a line for each queue: how many wait in it, how many its running kernel takes.\n\
+         /// Counters of a pass, then words at the head of a line for each queue: how many wait in it, how many its running kernel takes, whether all paths alive waited in it.\n\
          var<storage, read_write> control: array<atomic<u32>>;\n\n\
          /// The word that counts what waits in a queue.\n\
          fn waiting_word(number: u32) -> u32 {{\n    return {STRIDE}u * (1u + number);\n}}\n\n\
@@ -208,7 +228,7 @@ pub(super) fn queue_module(queues: &Queues) -> String {
     let kind = queues.kind;
     let mut text = String::from(
         "import package::control::{control, waiting, waiting_word};\n\
-         import package::pass::{path_count, pass_info};\n\n",
+         import package::pass::{path_count, path_id, pass_info};\n\n",
     );
     for (stage, number) in queues.stages.iter().zip(0..) {
         let _ = writeln!(text, "const {}: u32 = {number}u;", stage_constant(stage));
@@ -221,6 +241,8 @@ pub(super) fn queue_module(queues: &Queues) -> String {
         text,
         "\n/// Queues in all.\n\
          const QUEUES: u32 = {count}u;\n\n\
+         /// Those of stages, the first ones.\n\
+         const STAGE_QUEUES: u32 = {stages}u;\n\n\
          /// Threads of the workgroups that take from queues.\n\
          const WORKGROUP_THREADS: u32 = {}u;\n\n\
          /// Parts of 32 invocations that a workgroup has.\n\
@@ -229,6 +251,7 @@ pub(super) fn queue_module(queues: &Queues) -> String {
          const SHARES: u32 = {}u;\n",
         queues.workgroup,
         count * parts,
+        stages = queues.stages.len(),
     );
     text.push_str(QUEUE);
     text.push_str(PLACES);
@@ -245,7 +268,14 @@ pub(super) fn queue_module(queues: &Queues) -> String {
         QueueKind::None => text.push_str(TAKES),
     }
     if !queues.ordered.is_empty() {
+        let _ = write!(
+            text,
+            "\n/// Slots that an invocation looks at to put paths in order.\nconst ORDER_TURNS: u32 = {ORDER_TURNS}u;\n"
+        );
         text.push_str(ORDER);
+    }
+    if !queues.packed.is_empty() {
+        text.push_str(PACK);
     }
     text.push_str(APPEND);
     if queues.regenerates {
@@ -378,20 +408,93 @@ fn takes(number: u32, path: u32) -> bool {
 ";
 
 const ORDER: &str = r"
-/// Takes this path into a queue if it waits for that. To be called by all invocations of a workgroup.
-fn take_in_order(number: u32, path: u32, lane: u32) {
-    let wanted = path < pass_info.slots && waits_for[path] == number + 1u;
-    if wanted {
-        waits_for[path] = 0u;
+/// Slots side by side that a workgroup looks at.
+const ORDER_BLOCK: u32 = ORDER_TURNS * WORKGROUP_THREADS;
+
+/// Words of a bit each.
+const ORDER_WORDS: u32 = ORDER_BLOCK / 32u;
+
+/// The slots of the block whose paths wait.
+var<workgroup> waiting_slots: array<atomic<u32>, ORDER_WORDS>;
+/// How many of them stand before each word.
+var<workgroup> waiting_before: array<u32, ORDER_WORDS>;
+/// The place of the first.
+var<workgroup> waiting_place: u32;
+
+/// Takes the paths of a block of slots that wait for a queue into it, in the order of their slots and in places side by side. To be
+/// called by all invocations of a workgroup.
+fn take_in_order(number: u32, block: u32, lane: u32) {
+    for (var turn = 0u; turn < ORDER_TURNS; turn += 1u) {
+        let slot = turn * WORKGROUP_THREADS + lane;
+        let path = block * ORDER_BLOCK + slot;
+        if path < pass_info.slots && waits_for[path] == number + 1u {
+            waits_for[path] = 0u;
+            atomicOr(&waiting_slots[slot / 32u], 1u << (slot % 32u));
+        }
     }
-    let rank = ask_place(number, wanted, lane);
-    take_places(1u, lane);
-    stand(number, wanted, path, rank, lane);
+    workgroupBarrier();
+    if lane < ORDER_WORDS {
+        var before = 0u;
+        for (var word = 0u; word < lane; word += 1u) {
+            before += countOneBits(atomicLoad(&waiting_slots[word]));
+        }
+        waiting_before[lane] = before;
+        let count = before + countOneBits(atomicLoad(&waiting_slots[lane]));
+        if lane == ORDER_WORDS - 1u && count > 0u {
+            waiting_place = atomicAdd(&control[waiting_word(number) + 1u], count);
+        }
+    }
+    workgroupBarrier();
+    for (var turn = 0u; turn < ORDER_TURNS; turn += 1u) {
+        let slot = turn * WORKGROUP_THREADS + lane;
+        let word = atomicLoad(&waiting_slots[slot / 32u]);
+        let bit = 1u << (slot % 32u);
+        if (word & bit) != 0u {
+            let place = waiting_place + waiting_before[slot / 32u] + countOneBits(word & (bit - 1u));
+            queue[number * path_count + place] = block * ORDER_BLOCK + slot;
+        }
+    }
 }
 
 /// Makes the kernel of a queue take what is then put into it, instead of what waits in it.
 fn open_order(number: u32) {
     atomicStore(&control[waiting_word(number) + 1u], 0u);
+}
+";
+
+/// Of the paths that a workgroup takes from a queue in order, those of one block of slots have all slots between the first and the last
+/// of them to themselves, if no path waits elsewhere.
+const PACK: &str = r"
+/// Notes whether all paths alive wait for one queue.
+fn note_whether_all_wait(number: u32) {
+    var others = 0u;
+    for (var other = 0u; other < STAGE_QUEUES; other += 1u) {
+        if other != number {
+            others += waiting(other);
+        }
+    }
+    atomicStore(&control[waiting_word(number) + 2u], select(0u, 1u, others == 0u));
+}
+
+/// The slot in which this path goes on, at place `index` of a queue: behind those of its block before it, without a gap. `lane` is its
+/// invocation's number in the workgroup. All of the workgroup must have read what they need of their old slots.
+fn packed_slot(number: u32, index: u32, lane: u32) -> u32 {
+    if atomicLoad(&control[waiting_word(number) + 2u]) == 0u {
+        return path_id;
+    }
+    let first_place = number * path_count;
+    let block = path_id / ORDER_BLOCK;
+    var first = index - lane;
+    var last = index;
+    while first < last {
+        let middle = (first + last) / 2u;
+        if queue[first_place + middle] / ORDER_BLOCK == block {
+            last = middle;
+        } else {
+            first = middle + 1u;
+        }
+    }
+    return queue[first_place + first] + index - first;
 }
 ";
 

@@ -66,6 +66,12 @@ impl Rounds {
             _ => inside > 0 || outside > 1,
         }
     }
+
+    /// Whether there is an inner loop and a kernel is not part of it: paths that leave the loop may all meet there.
+    pub(super) fn is_beside_inner(&self, fusion: &Fusion, entry: &str) -> bool {
+        let inside = |place| self.inner.as_ref().is_some_and(|inner| inner.kernels.contains(&place));
+        self.inner.is_some() && !fusion.queued.get_index_of(entry).is_some_and(inside)
+    }
 }
 
 /// Paths that a pass may have for each slot, if one takes so many rounds.

@@ -171,7 +171,7 @@ fn kernel<'a>(plan: &'a Plan, name: &str) -> &'a crate::plan::Kernel {
 /// The kernels of some steps.
 fn names<'a>(plan: &'a Plan, steps: impl IntoIterator<Item = &'a Step>) -> Vec<&'a str> {
     let name = |step: &Step| match step {
-        Step::Dispatch { kernel } | Step::Single { kernel } | Step::Indirect { kernel, .. } => *kernel,
+        Step::Dispatch { kernel, .. } | Step::Single { kernel } | Step::Indirect { kernel, .. } => *kernel,
         Step::Loop { .. } => panic!("{step:?}"),
     };
     steps.into_iter().map(|step| plan.kernels[name(step)].name.as_str()).collect()

@@ -90,7 +90,7 @@ fn plan(film: Accumulate) -> Plan {
         ],
         program: vec![
             Step::Single { kernel: 0 },
-            Step::Dispatch { kernel: 1 },
+            Step::Dispatch { kernel: 1, slots: 64 },
             Step::Single { kernel: 2 },
             Step::Loop { turns: vec![2], body: vec![Step::Indirect { kernel: 3, slot: 1 }] },
         ],

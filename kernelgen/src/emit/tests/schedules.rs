@@ -441,6 +441,27 @@ fn paths_that_leave_an_inner_loop_are_put_in_order() {
     assert!(!ordered("emit") && ordered("trace"));
 }
 
+/// `emit` loads what lives on though it does not use it, waits for its workgroup, and stores in the slot it is given.
+#[test]
+fn paths_that_meet_behind_an_inner_loop_move_side_by_side() {
+    let plan = with_an_inner_loop(&[("schedule.order", "packed")]);
+    let emit = &kernel(&plan, "emit").module;
+    let (before, after) = emit.split_once("    storageBarrier();\n").expect("waits");
+    assert!(before.contains("path_taken = path_numbers[path_id];"), "{emit}");
+    assert!(
+        after.contains("path_id = packed_slot(QUEUE_EMIT, index, lane);\n        path_numbers[path_id] = path_taken;")
+    );
+    assert!(kernel(&plan, "emit_first").module.contains("path_numbers[index] = index;"));
+    assert!(kernel(&plan, "prepare_emit").module.contains("    note_whether_all_wait(QUEUE_EMIT);\n    "));
+    for name in ["trace", "shade"] {
+        assert!(!kernel(&plan, name).module.contains("packed_slot"), "{name} is inside the loop");
+    }
+    for set in [("schedule.loops", "flat"), ("schedule.queue", "none"), ("schedule.order", "slot")] {
+        let plan = with_an_inner_loop(&[("schedule.order", "packed"), set]);
+        assert!(plan.kernels.iter().all(|kernel| !kernel.module.contains("path_numbers")), "{set:?}");
+    }
+}
+
 #[test]
 fn wrong_inner_loops_are_refused() {
     let code = |inner: &str| {
