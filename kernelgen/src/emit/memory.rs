@@ -118,6 +118,15 @@ pub(super) fn access(
     access
 }
 
+/// Bytes that a kernel moves more if it takes along all that lives on.
+pub(super) fn carried_bytes(placement: &Placement, traffic: &KernelTraffic) -> u32 {
+    let bytes = |carries| {
+        let access = access(placement, traffic, &BTreeMap::new(), carries);
+        access.load_bytes + access.store_bytes
+    };
+    bytes(true) - bytes(false)
+}
+
 fn push_late(placement: &Placement, stages: &BTreeSet<String>, leaves: &BTreeSet<Leaf>, access: &mut Access) {
     let traffic = KernelTraffic { loads: leaves.clone(), ..KernelTraffic::default() };
     let memory = Memory { placement, traffic: &traffic, words: words(placement), carries: false };

@@ -74,7 +74,8 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     check_initialised(&wiring, &liveness, start)?;
     let placement = layout::assign(&variant, &liveness)?;
     let rounds = Rounds::new(&variant, &wiring.fusion).map_err(|finding| vec![finding])?;
-    let queues = queues(&wiring, &variant, &rounds);
+    let mut queues = queues(&wiring, &variant, &rounds);
+    queues.packed = packed(&wiring, &variant, &rounds, &queues, &placement, &liveness);
     let layers = film::used(layers, &wiring.splats);
     add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues, rounds.most);
     add_module(sources, &mut modules, "film", film::module(variant.schedule.accumulate, &layers));
@@ -196,18 +197,31 @@ fn queues(wiring: &Wiring, variant: &Variant, rounds: &Rounds) -> Queues {
     let sorts = variant.schedule.order != PathOrder::Arrival && kind != QueueKind::None;
     let has_key = |stage: &String| wiring.stages.get(stage).is_some_and(|stage| stage.key.is_some());
     let mixed = |stage: &&String| sorts && rounds.mixes(&wiring.fusion, stage) && !has_key(stage);
-    let ordered: Vec<String> = stages.iter().filter(mixed).cloned().collect();
-    let packs = variant.schedule.order == PathOrder::Packed;
-    let met = |stage: &&String| packs && rounds.is_beside_inner(&wiring.fusion, stage);
     Queues {
-        packed: ordered.iter().filter(met).cloned().collect(),
-        ordered,
+        ordered: stages.iter().filter(mixed).cloned().collect(),
+        packed: None,
         stages,
         streams: batched.map(|(name, _)| name.clone()).collect(),
         kind,
         regenerates: variant.schedule.regenerate.value > 1,
         workgroup: variant.schedule.workgroup.value,
     }
+}
+
+/// The stage whose paths close up, if the schedule has them do so: of those where all may meet, the one that takes along the least
+/// which it would not have moved anyway.
+fn packed(
+    wiring: &Wiring,
+    variant: &Variant,
+    rounds: &Rounds,
+    queues: &Queues,
+    placement: &Placement,
+    liveness: &Liveness,
+) -> Option<String> {
+    let packs = variant.schedule.order == PathOrder::Packed;
+    let meets = |stage: &&String| packs && rounds.is_beside_inner(&wiring.fusion, stage);
+    let extra = |stage: &&String| liveness.kernels.get(*stage).map(|traffic| memory::carried_bytes(placement, traffic));
+    queues.ordered.iter().filter(meets).min_by_key(extra).cloned()
 }
 
 /// K0210: a leaf that some stage reads although no stage before it surely wrote it.

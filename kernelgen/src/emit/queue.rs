@@ -43,8 +43,8 @@ pub(super) struct Queues {
     pub stages: Vec<String>,
     /// Those of them that take their paths in the order of slots.
     pub ordered: Vec<String>,
-    /// Those of them whose kernels give their paths slots side by side.
-    pub packed: Vec<String>,
+    /// The one of them whose kernel gives its paths slots side by side.
+    pub packed: Option<String>,
     /// Batched streams.
     pub streams: Vec<String>,
     /// How a path finds its place; with `None`, paths are marked instead.
@@ -58,8 +58,8 @@ pub(super) struct Queues {
 impl Queues {
     /// No queue.
     pub(super) fn none(workgroup: u32) -> Queues {
-        let (stages, ordered, packed, streams) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Queues { stages, ordered, packed, streams, kind: QueueKind::None, regenerates: false, workgroup }
+        let (stages, ordered, streams) = (Vec::new(), Vec::new(), Vec::new());
+        Queues { stages, ordered, packed: None, streams, kind: QueueKind::None, regenerates: false, workgroup }
     }
 
     /// Queues in all.
@@ -85,12 +85,12 @@ impl Queues {
 
     /// Whether the paths of a stage's kernel move into slots side by side.
     pub(super) fn is_packed(&self, stage: &str) -> bool {
-        self.packed.iter().any(|name| name == stage)
+        self.packed.as_deref() == Some(stage)
     }
 
     /// Whether slots know the numbers of their paths, which do not follow from theirs.
     pub(super) fn numbers_paths(&self) -> bool {
-        self.regenerates || !self.packed.is_empty()
+        self.regenerates || self.packed.is_some()
     }
 
     /// Whether paths wait for a stage in their slots, not in its queue.
@@ -274,7 +274,7 @@ pub(super) fn queue_module(queues: &Queues) -> String {
         );
         text.push_str(ORDER);
     }
-    if !queues.packed.is_empty() {
+    if queues.packed.is_some() {
         text.push_str(PACK);
     }
     text.push_str(APPEND);
