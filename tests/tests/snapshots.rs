@@ -3,6 +3,7 @@
 
 use kernelgen::Generated;
 use kernelgen::config::model::{Effect, Effects, Selection};
+use kernelgen::plan::Kernel;
 use kernelgen::source::FileKind;
 use runtime::configs::{Axis, Library};
 use runtime::scene::LoadOptions;
@@ -102,6 +103,16 @@ fn every_schedule() {
 fn the_flagship_as_a_gpu_runs_it() {
     let generated = generate(selection("sbdpt", "compact", "ordered", "f32", false));
     insta::assert_snapshot!("pipeline_sbdpt_compact_ordered", text_of(&generated));
+}
+
+/// The seed's paths all meet at `construct_eye`, too, which touches hardly any of their state.
+#[test]
+fn paths_close_up_where_the_least_is_taken_along() {
+    let generated = generate(selection("sbdpt_seed", "soa", "ordered", "f32", false));
+    let closes_up = |kernel: &&Kernel| kernel.module.contains("path_id = packed_slot(");
+    let closing: Vec<&str> =
+        generated.plan.kernels.iter().filter(closes_up).map(|kernel| kernel.name.as_str()).collect();
+    assert_eq!(closing, ["extend_light"]);
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! How much room a batched stream has and in what order paths wait never change the image: bit for bit with the fixed-point film.
 
+use kernelgen::source::FileKind;
+use runtime::configs::{Axis, Library};
 use tests::rendering::{Job, Rendering, shipped};
 
 /// One pass over all 2,048 slots, with paths so long that a stream with room for one record a slot must be emptied on the way.
@@ -55,6 +57,21 @@ fn every_order_of_queues_gives_the_same_bits() {
             assert_eq!(rendering.tallies, expected.tallies, "{pipeline}, {queue}, {order}: tallies");
         }
     }
+}
+
+/// Two turns a round are too few for most eye walks: some wait for the next round, in slots between those of paths that might close up.
+/// As long as they do, all paths keep their slots.
+#[test]
+fn paths_close_up_only_where_all_meet() {
+    let declared = r#"turns = "max_edges - round", rounds = "max_edges" }"#;
+    let text = Axis::Pipeline.shipped("sbdpt").expect("it is shipped");
+    assert!(text.contains(declared), "the declaration has changed");
+    let text = text.replace(declared, r#"turns = "2", rounds = "max_edges * max_edges" }"#);
+    let mut library = Library::default();
+    library.sources.add(FileKind::Config, "pipelines/hurried.toml", "hurried.toml", text);
+    let expected = job("sbdpt").layout("compact").render();
+    let hurried = job("hurried").library(library).layout("compact").schedule("ordered").render();
+    assert!(hurried.sums == expected.sums, "a path was written over");
 }
 
 /// Where a workgroup gathers records, an invocation keeps its last one for it; what a stage pushed before that must not be lost.
