@@ -275,7 +275,7 @@ fn leave(targets: &[(String, String)], gathered: &[String], queues: &Queues, imp
         return if goes.is_empty() { goes } else { format!("\n{goes}") };
     }
     imports.add("queue", ["ask_place", "take_places"]);
-    format!("\n    let ranks = array<u32, {}>({});\n    take_places(0u, lane);\n{goes}", asks.len(), asks.join(", "))
+    format!("\n    let ranks = array<u32, {}>({});\n    take_places(lane);\n{goes}", asks.len(), asks.join(", "))
 }
 
 /// The line that gives a slot whose path goes nowhere the next path.

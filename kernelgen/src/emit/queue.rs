@@ -346,9 +346,9 @@ fn ask_place(number: u32, wanted: bool, lane: u32) -> u32 {
     return atomicAdd(&shares[number * WORKGROUP_PARTS + lane / 32u], 1u);
 }
 
-/// Takes places for all that have asked, with one atomic a queue; `counter` is 0 for queues that wait, 1 for one that runs. Neighbours
-/// get places side by side. `lane` numbers the invocations, which must all call it, once.
-fn take_places(counter: u32, lane: u32) {
+/// Takes places for all that have asked, with one atomic a queue. Neighbours get places side by side. `lane` numbers the invocations,
+/// which must all call it, once.
+fn take_places(lane: u32) {
     workgroupBarrier();
     for (var number = lane; number < QUEUES; number += WORKGROUP_THREADS) {
         let first = number * WORKGROUP_PARTS;
@@ -357,7 +357,7 @@ fn take_places(counter: u32, lane: u32) {
             count += atomicLoad(&shares[first + part]);
         }
         if count > 0u {
-            var place = atomicAdd(&control[waiting_word(number) + counter], count);
+            var place = atomicAdd(&control[waiting_word(number)], count);
             for (var part = 0u; part < WORKGROUP_PARTS; part += 1u) {
                 place += atomicExchange(&shares[first + part], place);
             }

@@ -319,7 +319,7 @@ fn a_workgroup_takes_places_in_all_queues_at_once() {
     let expected = "
     let ranks = array<u32, 2>(ask_place(QUEUE_TRACE, outcome == SCATTERED, lane), \
         ask_place(STREAM_CONNECTION, connection_arrives(), lane));
-    take_places(0u, lane);
+    take_places(lane);
     stand(QUEUE_TRACE, outcome == SCATTERED, path_id, ranks[0], lane);
     gather_connection(ranks[1], lane);
 }";
