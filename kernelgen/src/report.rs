@@ -3,7 +3,7 @@
 use crate::analyze::{Leaf, Liveness, StageFacts};
 use crate::config::model::{Order, Variant};
 use crate::config::quantity::LeafType;
-use crate::layout::{self, Placement, StateLeaf};
+use crate::layout::{self, InPlace, Placement, StateLeaf};
 use crate::plan::Plan;
 use crate::source::{Sources, Span};
 use serde::{Deserialize, Serialize};
@@ -127,6 +127,8 @@ struct FieldUse {
     live_out: Vec<String>,
     stored: Option<String>,
     shares: Vec<String>,
+    /// Copies that no kernel has to make: `light.hit.t in seed`.
+    in_place: Vec<String>,
     dead: Option<String>,
     /// Whether kernels use it without any storage.
     transient: bool,
@@ -138,6 +140,8 @@ pub(crate) struct Findings<'a> {
     pub variant: &'a Variant,
     pub plan: &'a Plan,
     pub placement: &'a Placement,
+    /// What kernels are spared because copies lie where their sources lay, by kernel.
+    pub in_place: &'a BTreeMap<String, InPlace>,
     pub liveness: &'a Liveness,
     pub stages: Vec<(&'a str, &'a StageFacts)>,
     /// Leaves that the keys of queues depend on, by stage.
@@ -224,7 +228,8 @@ fn codec(leaf: &StateLeaf) -> String {
 
 fn kernels(findings: &Findings<'_>) -> Vec<KernelReport> {
     let report = |kernel: &crate::plan::Kernel| {
-        let traffic = kernel.stages.first().and_then(|entry| findings.liveness.kernels.get(entry));
+        let needed = kernel.stages.first().and_then(|entry| findings.liveness.kernels.get(entry));
+        let traffic = needed.zip(findings.in_place.get(&kernel.name)).map(|(needed, spared)| spared.spare(needed));
         let names = |leaves: &BTreeSet<Leaf>| leaves.iter().map(Leaf::to_string).collect::<Vec<_>>();
         KernelReport {
             name: kernel.name.clone(),
@@ -270,6 +275,10 @@ fn field_use(findings: &Findings<'_>, declared: &StateLeaf) -> FieldUse {
     for (stage, reads) in &findings.keys {
         read.extend(reads.get(leaf).map(|span| format!("key of {}", at(stage, span))));
     }
+    let in_place = findings.in_place.iter().filter_map(|(kernel, in_place)| {
+        let source = in_place.copies.get(leaf)?;
+        Some(format!("{source} in {kernel}"))
+    });
     let live_out = findings.liveness.kernels.iter().filter(|(_, traffic)| traffic.live_out.contains(leaf));
     FieldUse {
         leaf: leaf.to_string(),
@@ -281,6 +290,7 @@ fn field_use(findings: &Findings<'_>, declared: &StateLeaf) -> FieldUse {
         live_out: live_out.map(|(stage, _)| stage.clone()).collect(),
         stored: findings.placement.slots.get(leaf).map(|slot| stored(findings.placement, slot)),
         shares: findings.placement.shares(leaf).into_iter().map(Leaf::to_string).collect(),
+        in_place: in_place.collect(),
         dead: findings.liveness.dead.get(leaf).cloned(),
         transient: dead(findings, declared).is_some_and(|reason| reason.reason == TRANSIENT),
     }
@@ -418,6 +428,9 @@ fn push_use(text: &mut String, indent: &str, leaf: &FieldUse) {
     }
     if !leaf.shares.is_empty() {
         let _ = writeln!(text, "{indent}shares bits with {}", leaf.shares.join(", "));
+    }
+    if !leaf.in_place.is_empty() {
+        let _ = writeln!(text, "{indent}copied in place from {}", leaf.in_place.join(", "));
     }
     if let Some(reason) = &leaf.dead {
         let _ = writeln!(text, "{indent}dead: {reason}");

@@ -41,6 +41,8 @@ pub fn stage_facts(
         ),
         _ => Default::default(),
     };
+    let copies = end.copies.iter().map(|(to, from)| (walk.leaves.get(*to).clone(), walk.leaves.get(*from).clone()));
+    let only_copied = only_copied(&walk, &end.copies);
     let leaf = |(index, span): (&usize, &Span)| (walk.leaves.get(*index).clone(), *span);
     let written: BTreeMap<Leaf, Span> = walk.stored.iter().map(leaf).collect();
     let is_sure = |leaf: &Leaf| end.written.iter().any(|index| walk.leaves.get(*index) == leaf);
@@ -49,6 +51,8 @@ pub fn stage_facts(
         reads: walk.read.iter().map(leaf).collect(),
         writes,
         maybe,
+        copies: copies.collect(),
+        only_copied,
         outcomes: returned,
         written_by_outcome,
         pushes: end.pushes,
@@ -104,6 +108,16 @@ fn record_of(module: &Module, ty: Handle<Type>) -> Option<Handle<Type>> {
         }
         _ => None,
     }
+}
+
+/// Sources of copies whose every load is stored to leaves that hold the copy at the end and that no load reads.
+fn only_copied(walk: &Walk<'_>, copies: &BTreeMap<usize, usize>) -> BTreeSet<Leaf> {
+    let is_read = |leaf: &usize| walk.used.contains(leaf) || walk.copied.iter().any(|(from, _)| from == leaf);
+    let is_only_copied = |source: &&usize| {
+        let mut copied = walk.copied.iter().filter(|(from, _)| from == *source);
+        !walk.used.contains(*source) && copied.all(|(_, to)| copies.get(to) == Some(*source) && !is_read(to))
+    };
+    copies.values().filter(is_only_copied).map(|source| walk.leaves.get(*source).clone()).collect()
 }
 
 /// What is written at every return that may return an outcome.

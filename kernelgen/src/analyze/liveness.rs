@@ -52,6 +52,10 @@ pub struct KernelTraffic {
     pub live_in: BTreeSet<Leaf>,
     /// Leaves whose value on exit may be used later.
     pub live_out: BTreeSet<Leaf>,
+    /// Where it is the kernel of one stage: stored leaves that are copies (see `StageFacts::copies`), and of what.
+    pub copies: BTreeMap<Leaf, Leaf>,
+    /// Where it is the kernel of one stage: leaves that are needed for copies alone (see `StageFacts::only_copied`).
+    pub only_copied: BTreeSet<Leaf>,
 }
 
 /// Leaves by stage.
@@ -152,7 +156,17 @@ impl<'a> KernelFlow<'a> {
                 }
             }
         }
+        self.add_copies(&mut traffic);
         traffic
+    }
+
+    /// What several stages copy among each other is not followed: a way may leave some of them out.
+    fn add_copies(&self, traffic: &mut KernelTraffic) {
+        let inside: Vec<(&str, &FlowStage)> = self.inside().collect();
+        let [(_, FlowStage { facts, .. })] = inside[..] else { return };
+        let stored = facts.copies.iter().filter(|(copy, _)| traffic.stores.contains(*copy));
+        traffic.copies = stored.map(|(copy, source)| (copy.clone(), source.clone())).collect();
+        traffic.only_copied = facts.only_copied.clone();
     }
 
     /// What every way from the entry has surely written when a stage begins, by the greatest fixpoint: ways that meet, also those of

@@ -51,6 +51,10 @@ pub struct StageFacts {
     pub writes: BTreeMap<Leaf, Span>,
     /// Written on some way only.
     pub maybe: BTreeMap<Leaf, Span>,
+    /// Copies: leaves that on every return hold what another leaf held on entry, and that leaf.
+    pub copies: BTreeMap<Leaf, Leaf>,
+    /// Sources of copies that are read for nothing else, and whose copies are not read again.
+    pub only_copied: BTreeSet<Leaf>,
     /// Outcome names (lower case) that reach a return, with the place of one such return.
     pub outcomes: BTreeMap<String, Span>,
     /// What is surely written where an outcome is returned: more than `writes` where other returns write less.

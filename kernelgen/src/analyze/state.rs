@@ -12,6 +12,9 @@ pub(super) type Pushes = BTreeMap<String, Option<u32>>;
 pub(super) struct State {
     /// Leaves that were surely written.
     pub written: BTreeSet<usize>,
+    /// What leaves hold that were written on some way: what that leaf held on entry to the stage, or something else. The others hold
+    /// what they held on entry themselves.
+    pub held: BTreeMap<usize, Option<usize>>,
     /// Local variables, by depth of calls, whose values are known.
     pub locals: BTreeMap<(usize, Handle<LocalVariable>), Values>,
     /// Most pushes so far.
@@ -21,6 +24,7 @@ pub(super) struct State {
 impl State {
     pub(super) fn join(mut self, other: State) -> State {
         self.written.retain(|leaf| other.written.contains(leaf));
+        self.join_held(&other);
         let mut locals = BTreeMap::new();
         for (local, values) in self.locals {
             if let Some(others) = other.locals.get(&local)
@@ -40,6 +44,7 @@ impl State {
     /// Gives up on everything that still changes from one round of a loop to the next.
     pub(super) fn widen(mut self, next: &State) -> State {
         self.written.retain(|leaf| next.written.contains(leaf));
+        self.join_held(next);
         self.locals.retain(|local, values| next.locals.get(local) == Some(values));
         for (stream, count) in &next.pushes {
             if self.pushes.get(stream) != Some(count) {
@@ -47,6 +52,18 @@ impl State {
             }
         }
         self
+    }
+
+    /// The leaf whose value on entry a leaf holds for sure.
+    pub(super) fn holds(&self, leaf: usize) -> Option<usize> {
+        self.held.get(&leaf).copied().unwrap_or(Some(leaf))
+    }
+
+    /// Keeps what leaves hold on both ways.
+    fn join_held(&mut self, other: &State) {
+        let leaves: BTreeSet<usize> = self.held.keys().chain(other.held.keys()).copied().collect();
+        let joined = |leaf| (leaf, self.holds(leaf).filter(|held| other.holds(leaf) == Some(*held)));
+        self.held = leaves.into_iter().map(joined).collect();
     }
 
     /// Adds pushes that happen behind this point.

@@ -155,6 +155,113 @@ fn part_of_a_vector_is_read_and_written() {
     assert_eq!(of("walk.position = vec3f(); walk.position.x = 1.0;"), ["", "eye.position", ""]);
 }
 
+/// Copies of a stage over two walks, and the sources that nothing else needs.
+fn copies_of(body: &str) -> [String; 2] {
+    let facts = facts(&format!(
+        "fn f(a: ptr<function, Walk>, b: ptr<function, Walk>) {{ {body} }}
+         fn give(source: ptr<function, Walk>, copy: ptr<function, Walk>) {{ copy.pdf = source.pdf; }}
+         fn clear(walk: ptr<function, Walk>) {{ if data[1] > 0.0 {{ walk.pdf = 0.0; }} }}
+         fn own(walk: ptr<function, Walk>) -> f32 {{ return walk.pdf; }}"
+    ));
+    let copies = facts.copies.iter().map(|(copy, source)| format!("{copy}={source}"));
+    let only_copied = facts.only_copied.iter().map(Leaf::to_string);
+    [copies.collect::<Vec<_>>().join(" "), only_copied.collect::<Vec<_>>().join(" ")]
+}
+
+#[track_caller]
+fn copies(body: &str, expected: &str) {
+    assert_eq!(copies_of(body)[0], expected, "{body}");
+}
+
+#[test]
+fn copies_hold_on_every_return() {
+    copies("b.pdf = a.pdf;", "b.pdf=a.pdf");
+    copies("let pdf = (*a).pdf; b.pdf = pdf;", "b.pdf=a.pdf");
+    copies("if data[0] > 0.0 { b.pdf = a.pdf; }", "");
+    copies("if data[0] > 0.0 { b.pdf = a.pdf; } else { b.pdf = 1.0; }", "");
+    copies("if data[0] > 0.0 { b.pdf = a.pdf; } else { b.pdf = a.pdf; }", "b.pdf=a.pdf");
+    copies("if data[0] > 0.0 { b.position = a.position; } else { b.position = a.throughput; }", "");
+    copies("if data[0] > 0.0 { return; } b.pdf = a.pdf;", "");
+    copies("if data[0] > 0.0 { b.pdf = a.pdf; return; } b.depth = 1u; b.pdf = a.pdf;", "b.pdf=a.pdf");
+    copies("if LACKS { return; } b.pdf = a.pdf;", "b.pdf=a.pdf");
+    copies("for (var i = 0; i < i32(data[0]); i++) { b.pdf = a.pdf; }", "");
+    copies("loop { b.pdf = a.pdf; if data[0] > 0.0 { break; } }", "b.pdf=a.pdf");
+    copies("loop { b.pdf = a.pdf; if data[0] > 0.0 { break; } a.pdf = 1.0; }", "");
+    copies("switch u32(data[0]) { case 1u: { b.pdf = a.pdf; } default: { b.pdf = a.pdf; } }", "b.pdf=a.pdf");
+}
+
+#[test]
+fn copies_are_of_values_on_entry() {
+    copies("a.pdf = 1.0; b.pdf = a.pdf;", "");
+    copies("if data[0] > 0.0 { a.pdf = 1.0; } b.pdf = a.pdf;", "");
+    copies("a.position.x = 1.0; b.position = a.position;", "");
+    copies("b.pdf = a.pdf; a.pdf = 1.0;", "b.pdf=a.pdf");
+    // What counts is when the source was loaded.
+    copies("let pdf = a.pdf; a.pdf = 1.0; b.pdf = pdf;", "b.pdf=a.pdf");
+    copies("let pdf = a.pdf; a.pdf = b.pdf; b.pdf = pdf;", "a.pdf=b.pdf b.pdf=a.pdf");
+    copies("b.position = a.position; b.throughput = b.position;", "b.position=a.position b.throughput=a.position");
+    copies("b.pdf = a.pdf; a.pdf = b.pdf;", "b.pdf=a.pdf");
+}
+
+#[test]
+fn copies_end_where_something_else_is_stored() {
+    copies("b.pdf = a.pdf; b.pdf = 1.0;", "");
+    copies("b.pdf = a.pdf; b.pdf += 0.0;", "");
+    copies("b.pdf = a.pdf; if data[0] > 0.0 { b.pdf = 1.0; }", "");
+    copies("b.pdf = 1.0; b.pdf = a.pdf;", "b.pdf=a.pdf");
+    copies("b.position = a.position; b.position = a.throughput;", "b.position=a.throughput");
+    copies("b.position = a.position; b.position.y = 1.0;", "");
+    copies("b.position = a.position; b.position[u32(data[0])] = 1.0;", "");
+    copies("b.position.x = a.position.x;", "");
+    copies("b.pdf = a.pdf; *b = Walk();", "");
+    copies("b.pdf = a.pdf * 1.0;", "");
+}
+
+#[test]
+fn structs_are_copied_member_by_member() {
+    copies("b.hit = a.hit;", "b.hit.prim=a.hit.prim b.hit.t=a.hit.t b.hit.uv=a.hit.uv");
+    copies("b.hit = a.old; b.hit.t = 1.0;", "b.hit.prim=a.old.prim b.hit.uv=a.old.uv");
+    copies("a.hit.t = 1.0; b.hit = a.hit;", "b.hit.prim=a.hit.prim b.hit.uv=a.hit.uv");
+    copies("b.hit.uv = a.hit.uv;", "b.hit.uv=a.hit.uv");
+    let [all, only] = copies_of("*b = *a;");
+    assert_eq!(all.split(' ').count(), 10, "{all}");
+    assert_eq!(only.split(' ').count(), 10, "{only}");
+}
+
+#[test]
+fn copies_are_followed_into_helpers() {
+    copies("give(a, b);", "b.pdf=a.pdf");
+    copies("give(a, b); clear(b);", "");
+    copies("clear(a); give(a, b);", "");
+    copies("give(a, b); clear(a);", "b.pdf=a.pdf");
+    copies("b.pdf = own(a);", "");
+}
+
+#[test]
+fn what_is_needed_for_copies_alone_need_not_be_loaded() {
+    let only = |body: &str, expected: &str| assert_eq!(copies_of(body)[1], expected, "{body}");
+    only("b.pdf = a.pdf;", "a.pdf");
+    only("give(a, b);", "a.pdf");
+    only("b.pdf = a.pdf; a.pdf = 1.0;", "a.pdf");
+    only("b.hit = a.hit;", "a.hit.prim a.hit.t a.hit.uv");
+    // The stage uses the source itself, before or after, or what it is stored with.
+    only("if a.pdf > 0.0 { b.depth = 1u; } b.pdf = a.pdf;", "");
+    only("b.pdf = a.pdf; b.depth = u32(a.pdf);", "");
+    only("let pdf = a.pdf; b.pdf = pdf; b.depth = u32(pdf);", "");
+    only("b.position = a.position; b.throughput.x = a.position.x;", "");
+    only("a.position.x = 1.0; b.throughput = a.throughput; b.position = a.position;", "a.throughput");
+    only("var pdf = a.pdf; b.pdf = a.pdf;", "");
+    only("b.pdf = a.pdf; b.position.x = own(a);", "");
+    // The copy is read again.
+    only("b.pdf = a.pdf; b.depth = u32(b.pdf);", "");
+    only("b.position = a.position; b.throughput = b.position;", "");
+    only("b.position = a.position; b.position.x = 1.0;", "");
+    // Another copy does not hold on every return.
+    only("b.position = a.position; if data[0] > 0.0 { b.throughput = a.position; }", "");
+    only("b.position = a.position; b.throughput = a.position; b.throughput = vec3f();", "");
+    only("b.position = a.position; b.throughput = a.position;", "a.position");
+}
+
 #[test]
 fn helpers_are_followed_for_each_binding() {
     let facts = facts(

@@ -1,7 +1,8 @@
-//! Which members of a loaded struct are used: `let hit = walk.hit; hit.t` needs `t` alone.
+//! What loaded values are used for: of a struct, which members (`let hit = walk.hit; hit.t` needs `t` alone); and whether a value is
+//! only stored elsewhere.
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{Expression, Function, Handle, Module, TypeInner};
+use naga::{Block, Expression, Function, Handle, Module, Statement, TypeInner};
 
 /// naga's count of the uses of every expression.
 pub(super) struct Uses<'m> {
@@ -35,6 +36,12 @@ impl<'m> Uses<'m> {
         inner.collect()
     }
 
+    /// Whether nothing is done with the value of an expression but to store it.
+    pub(super) fn is_only_stored(&self, function: Handle<Function>, expression: Handle<Expression>) -> bool {
+        let uses = self.info.as_ref().map(|info| info[function][expression].ref_count);
+        uses == Some(stores(&self.module.functions[function].body, expression))
+    }
+
     /// The expressions that take one member of a value.
     fn members(
         &self,
@@ -46,4 +53,17 @@ impl<'m> Uses<'m> {
             _ => None,
         })
     }
+}
+
+/// How often a block stores a value.
+fn stores(block: &Block, stored: Handle<Expression>) -> usize {
+    let count = |statement: &Statement| match statement {
+        Statement::Store { value, .. } => usize::from(*value == stored),
+        Statement::Block(block) => stores(block, stored),
+        Statement::If { accept, reject, .. } => stores(accept, stored) + stores(reject, stored),
+        Statement::Switch { cases, .. } => cases.iter().map(|case| stores(&case.body, stored)).sum(),
+        Statement::Loop { body, continuing, .. } => stores(body, stored) + stores(continuing, stored),
+        _ => 0,
+    };
+    block.iter().map(count).sum()
 }

@@ -40,6 +40,8 @@ impl Argument {
 pub(super) struct End {
     /// Leaves written on every return.
     pub written: BTreeSet<usize>,
+    /// Leaves that on every return hold what another one held on entry, and that one.
+    pub copies: BTreeMap<usize, usize>,
     /// Most pushes to each stream.
     pub pushes: Pushes,
     /// Every return of a value.
@@ -65,6 +67,14 @@ struct Summary {
     pushes: Pushes,
 }
 
+/// A leaf that a load has read as a whole.
+#[derive(Clone, Copy)]
+struct LoadedLeaf {
+    leaf: usize,
+    /// The leaf whose value on entry it held then, if any.
+    holds: Option<usize>,
+}
+
 /// A function that is being walked over.
 struct Frame<'m> {
     handle: Handle<Function>,
@@ -73,6 +83,8 @@ struct Frame<'m> {
     arguments: Vec<Argument>,
     /// Values of expressions that have been evaluated.
     values: BTreeMap<Handle<Expression>, Values>,
+    /// What loads of whole leaves have read.
+    loaded: BTreeMap<Handle<Expression>, Vec<LoadedLeaf>>,
     /// What holds at its returns so far.
     returned: Option<State>,
     result: Values,
@@ -93,6 +105,10 @@ pub(super) struct Walk<'m> {
     pub leaves: Leaves,
     /// Leaves read where they were not surely written, with the first place.
     pub read: BTreeMap<usize, Span>,
+    /// Leaves read anywhere for something else than to be copied to a leaf.
+    pub used: BTreeSet<usize>,
+    /// Leaves read to be copied, and the leaves that they were copied to, wherever that was.
+    pub copied: BTreeSet<(usize, usize)>,
     /// Leaves written anywhere, with the first place.
     pub stored: BTreeMap<usize, Span>,
     /// Names of the module's variables in use.
@@ -108,6 +124,8 @@ impl<'m> Walk<'m> {
             linked,
             leaves,
             read: BTreeMap::new(),
+            used: BTreeSet::new(),
+            copied: BTreeSet::new(),
             stored: BTreeMap::new(),
             globals: BTreeSet::new(),
             summaries: BTreeMap::new(),
@@ -119,7 +137,9 @@ impl<'m> Walk<'m> {
     pub(super) fn stage(&mut self, function: Handle<Function>, arguments: Vec<Argument>) -> End {
         let frame = self.run(function, arguments, State::default(), 0);
         let end = frame.returned.unwrap_or_default();
-        End { written: end.written, pushes: end.pushes, exits: frame.exits }
+        let copies = end.held.into_iter().filter_map(|(leaf, held)| Some((leaf, held?)));
+        let copies = copies.filter(|(leaf, held)| leaf != held).collect();
+        End { written: end.written, copies, pushes: end.pushes, exits: frame.exits }
     }
 
     fn run(&mut self, handle: Handle<Function>, arguments: Vec<Argument>, mut state: State, depth: usize) -> Frame<'m> {
@@ -130,6 +150,7 @@ impl<'m> Walk<'m> {
             depth,
             arguments,
             values: BTreeMap::new(),
+            loaded: BTreeMap::new(),
             returned: None,
             result: Values::none(),
             exits: Vec::new(),
@@ -207,8 +228,7 @@ impl<'m> Walk<'m> {
             }
             Statement::Kill => return None,
             Statement::Store { pointer, value } => {
-                let values = self.evaluate(frame, *value);
-                self.store(self.place(frame, *pointer), values, span, &mut state);
+                self.store(frame, self.place(frame, *pointer), *value, span, &mut state);
             }
             Statement::Call { function, arguments, result } => {
                 let (values, state) = self.call(frame, *function, arguments, state)?;
@@ -377,13 +397,22 @@ impl<'m> Walk<'m> {
         frame.values.insert(expression, values);
     }
 
-    fn load(&mut self, frame: &Frame<'m>, expression: Handle<Expression>, place: &Place, state: &State) -> Values {
+    fn load(&mut self, frame: &mut Frame<'m>, expression: Handle<Expression>, place: &Place, state: &State) -> Values {
         match place.root {
             Root::Record(record) => {
                 let span = place_of(frame.function.expressions.get_span(expression), self.linked);
+                let covered = self.leaves.covered(record, &place.path);
+                let is_copied = covered.whole && self.uses.is_only_stored(frame.handle, expression);
                 for members in self.uses.paths(frame.handle, expression) {
                     let path: Vec<Step> = place.path.iter().copied().chain(members.into_iter().map(Some)).collect();
                     self.read(record, &path, span, state);
+                    if !is_copied {
+                        self.used.extend(self.leaves.covered(record, &path).leaves);
+                    }
+                }
+                if covered.whole {
+                    let loaded = covered.leaves.map(|leaf| LoadedLeaf { leaf, holds: state.holds(leaf) });
+                    frame.loaded.insert(expression, loaded.collect());
                 }
                 Values::Unknown
             }
@@ -405,25 +434,60 @@ impl<'m> Walk<'m> {
         }
     }
 
-    fn store(&mut self, place: Place, values: Values, span: naga::Span, state: &mut State) {
+    fn store(
+        &mut self,
+        frame: &Frame<'m>,
+        place: Place,
+        value: Handle<Expression>,
+        span: naga::Span,
+        state: &mut State,
+    ) {
+        let loaded = frame.loaded.get(&value).map_or(&[][..], Vec::as_slice);
         match place.root {
-            Root::Record(record) => {
-                let span = place_of(span, self.linked);
-                let covered = self.leaves.covered(record, &place.path);
-                if !covered.whole {
-                    self.read(record, &place.path, span, state);
-                }
-                for leaf in covered.leaves {
-                    state.written.insert(leaf);
-                    self.stored.entry(leaf).or_insert(span);
-                }
-            }
+            Root::Record(record) => self.store_leaves(record, &place.path, loaded, span, state),
             Root::Local(depth, local) => {
-                let values = if place.path.is_empty() { values } else { Values::Unknown };
+                let values = if place.path.is_empty() { self.evaluate(frame, value) } else { Values::Unknown };
                 set_local(state, (depth, local), values);
+                self.use_loaded(loaded);
             }
-            Root::Global(_) | Root::Other => self.touch(&place),
+            Root::Global(_) | Root::Other => {
+                self.touch(&place);
+                self.use_loaded(loaded);
+            }
         }
+    }
+
+    /// Stores to a part of a record a value that was loaded from these leaves, or from none.
+    fn store_leaves(
+        &mut self,
+        record: usize,
+        path: &[Step],
+        loaded: &[LoadedLeaf],
+        span: naga::Span,
+        state: &mut State,
+    ) {
+        let span = place_of(span, self.linked);
+        let covered = self.leaves.covered(record, path);
+        let copies = covered.whole && loaded.len() == covered.leaves.len();
+        if !covered.whole {
+            self.read(record, path, span, state);
+            self.used.extend(covered.leaves.clone());
+        }
+        if !copies {
+            self.use_loaded(loaded);
+        }
+        for (position, leaf) in covered.leaves.enumerate() {
+            let source = loaded.get(position).filter(|_| copies);
+            self.copied.extend(source.map(|source| (source.leaf, leaf)));
+            state.held.insert(leaf, source.and_then(|source| source.holds));
+            state.written.insert(leaf);
+            self.stored.entry(leaf).or_insert(span);
+        }
+    }
+
+    /// What is done with a loaded value is no copy to a leaf.
+    fn use_loaded(&mut self, loaded: &[LoadedLeaf]) {
+        self.used.extend(loaded.iter().map(|loaded| loaded.leaf));
     }
 
     fn touch(&mut self, place: &Place) {

@@ -100,6 +100,7 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
         variant: &variant,
         plan: &built.plan,
         placement: &placement,
+        in_place: &built.in_place,
         liveness: &liveness,
         stages: facts.collect(),
         keys: keys.collect(),

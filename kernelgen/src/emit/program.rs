@@ -15,7 +15,7 @@ use super::wiring::{WiredKey, Wiring};
 use crate::analyze::{self, KernelTraffic, Liveness};
 use crate::config::model::{Accumulate, LoadAt, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
-use crate::layout::Placement;
+use crate::layout::{InPlace, Placement};
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
 use crate::plan::{self, Binding, Buffer, Kernel, Layers, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
@@ -35,9 +35,10 @@ pub(super) struct Program<'a> {
     pub layers: &'a [Layers],
 }
 
-/// A plan and the effects that its kernels ask for.
+/// A plan, the effects that its kernels ask for, and what these are spared, by kernel.
 pub(super) struct Built {
     pub plan: Plan,
+    pub in_place: BTreeMap<String, InPlace>,
     pub effects_seen: BTreeSet<String>,
 }
 
@@ -57,6 +58,7 @@ pub(super) fn build(
         kernels: Vec::new(),
         effects_seen: BTreeSet::new(),
         findings: Vec::new(),
+        in_place: BTreeMap::new(),
         sum_keys: None,
     };
     let steps = builder.steps();
@@ -70,6 +72,7 @@ struct Builder<'a> {
     kernels: Vec<(Kernel, Vec<LinkedBinding>)>,
     effects_seen: BTreeSet<String>,
     findings: Vec<Diagnostic>,
+    in_place: BTreeMap<String, InPlace>,
     /// The kernel that all sorted queues share.
     sum_keys: Option<usize>,
 }
@@ -274,18 +277,22 @@ impl Builder<'_> {
         let Program { wiring, queues, liveness, .. } = *self.program;
         let entry = chain.entry.as_str();
         let packs = source == Source::Queue && queues.is_packed(entry);
+        let starts_again = source == Source::Slots && wiring.fusion.queued.contains_key(entry);
+        let kernel = if starts_again { format!("{entry}_first") } else { entry.to_owned() };
         let access = match liveness.kernels.get(entry) {
             Some(traffic) => {
                 let late = match self.program.variant.schedule.load {
                     LoadAt::Use => chain::late_leaves(wiring, chain, traffic),
                     LoadAt::Entry => BTreeMap::new(),
                 };
-                memory::access(self.program.placement, traffic, &late, packs)
+                // A path that moves into another slot takes along also what is a copy.
+                let in_place = if packs { InPlace::default() } else { self.program.placement.in_place(traffic) };
+                let moved = in_place.spare(traffic);
+                self.in_place.insert(kernel.clone(), in_place);
+                memory::access(self.program.placement, &moved, &late, packs)
             }
             None => Access::default(),
         };
-        let starts_again = source == Source::Slots && wiring.fusion.queued.contains_key(entry);
-        let kernel = if starts_again { format!("{entry}_first") } else { entry.to_owned() };
         let next = (queues.regenerates && chain.ends).then_some(wiring.fusion.start.entry.as_str());
         let gathered = &self.gathered(entry);
         let frame = Frame { kernel: &kernel, entry, source, queues, access: &access, packs, next, gathered };
@@ -408,7 +415,7 @@ impl Builder<'_> {
             needs,
             buffers: buffers.into_values().collect(),
         };
-        Built { plan, effects_seen: self.effects_seen }
+        Built { plan, in_place: self.in_place, effects_seen: self.effects_seen }
     }
 
     /// Generated buffers that a kernel uses (film, pass and control always), then scene resources in order of first use.

@@ -5,6 +5,7 @@ use crate::plan::{Access, Plan, Role, Step};
 use crate::source::{FileKind, Sources};
 use crate::{Generated, Refusal};
 
+mod copies;
 mod schedules;
 
 const PIPELINE: &str = r#"

@@ -1,11 +1,13 @@
 //! Packing without a plan of the user's: as few lanes as possible, vectors whole where that costs no lane, and together what the
-//! same kernels read and write. Where the layout shares, bits go to several leaves that never live together.
+//! same kernels read and write. Where the layout shares, bits go to several leaves that never live together, and copies to the place
+//! of their source, unless that takes more lanes.
 
+use super::copies::{self, Class};
 use super::interference::interfere;
 use super::{Assigned, Bits, Slot, StateLeaf, Table};
 use crate::analyze::{Leaf, Liveness};
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Packs the leaves of each table; leaves of instances without a table are left out.
 pub(super) fn assign(mut tables: Vec<Table>, leaves: &[StateLeaf], liveness: &Liveness, share: bool) -> Assigned {
@@ -17,12 +19,23 @@ pub(super) fn assign(mut tables: Vec<Table>, leaves: &[StateLeaf], liveness: &Li
             apart == table.rays && table.instances.contains(&leaf.leaf.instance)
         };
         let own: Vec<&StateLeaf> = leaves.iter().filter(is_own).collect();
-        let packer = Packer::new(&own, table.lane, liveness, share);
-        let lanes = packer.pack();
-        table.lanes = lanes.len() as u32;
-        slots.extend(packer.slots(index, &lanes));
+        let groupings = groupings(&own, liveness, share);
+        let packers = groupings.iter().map(|classes| Packer::new(classes, table.lane, liveness, share));
+        let packed = packers.map(|packer| (packer.pack(), packer));
+        if let Some((lanes, packer)) = packed.min_by_key(|(lanes, _)| lanes.len()) {
+            table.lanes = lanes.len() as u32;
+            slots.extend(packer.slots(index, &lanes));
+        }
     }
     (tables, slots)
+}
+
+/// The ways to group leaves into classes of one place, the best first if it takes no more lanes.
+fn groupings<'a>(leaves: &[&'a StateLeaf], liveness: &Liveness, share: bool) -> Vec<Vec<Class<'a>>> {
+    let coalesced = share.then(|| copies::coalesced(leaves, liveness));
+    let mut groupings: Vec<_> = coalesced.into_iter().chain([copies::alone(leaves)]).collect();
+    groupings.dedup();
+    groupings
 }
 
 /// Which kernels load and store something: one entry a kernel and direction.
@@ -63,7 +76,10 @@ struct Candidate {
 }
 
 struct Packer<'a> {
-    leaves: &'a [&'a StateLeaf],
+    /// Leaves that have one place.
+    classes: &'a [Class<'a>],
+    /// The first of each class: it stands for all of them.
+    leaves: Vec<&'a StateLeaf>,
     lane: u32,
     share: bool,
     accesses: Vec<Access>,
@@ -72,14 +88,17 @@ struct Packer<'a> {
 }
 
 impl<'a> Packer<'a> {
-    fn new(leaves: &'a [&'a StateLeaf], lane: u32, liveness: &Liveness, share: bool) -> Self {
-        let conflict = |a: &&StateLeaf, b: &&StateLeaf| !share || a == b || interfere(&a.leaf, &b.leaf, liveness);
-        let conflicts = leaves.iter().map(|a| leaves.iter().map(|b| conflict(a, b)).collect()).collect();
+    fn new(classes: &'a [Class<'a>], lane: u32, liveness: &Liveness, share: bool) -> Self {
+        let meet =
+            |a: &Class<'_>, b: &Class<'_>| a.iter().any(|a| b.iter().any(|b| interfere(&a.leaf, &b.leaf, liveness)));
+        let conflict = |a: &Class<'_>, b: &Class<'_>| !share || a == b || meet(a, b);
+        let conflicts = classes.iter().map(|a| classes.iter().map(|b| conflict(a, b)).collect()).collect();
         Packer {
-            leaves,
+            classes,
+            leaves: classes.iter().map(|class| class[0]).collect(),
             lane,
             share,
-            accesses: leaves.iter().map(|leaf| access(&leaf.leaf, liveness)).collect(),
+            accesses: classes.iter().map(|class| access(class, liveness)).collect(),
             conflicts,
         }
     }
@@ -188,8 +207,10 @@ impl<'a> Packer<'a> {
                 parts[held.leaf][held.part] = Bits { word, shift: held.shift, bits: held.bits };
             }
         }
-        let slot = |(leaf, parts): (&&StateLeaf, Vec<Bits>)| (leaf.leaf.clone(), Slot { table, parts });
-        self.leaves.iter().zip(parts).map(slot).collect()
+        let placed = self.classes.iter().zip(parts).flat_map(|(class, parts)| {
+            class.iter().map(move |leaf| (leaf.leaf.clone(), Slot { table, parts: parts.clone() }))
+        });
+        placed.collect()
     }
 }
 
@@ -199,9 +220,9 @@ fn is_vector(leaf: &StateLeaf) -> bool {
     parts.len() > 1 && parts.iter().all(|&bits| bits == 32)
 }
 
-fn access(leaf: &Leaf, liveness: &Liveness) -> Access {
-    let kernels = liveness.kernels.values();
-    kernels.flat_map(|kernel| [kernel.loads.contains(leaf), kernel.stores.contains(leaf)]).collect()
+fn access(class: &Class<'_>, liveness: &Liveness) -> Access {
+    let any = |moved: &BTreeSet<Leaf>| class.iter().any(|leaf| moved.contains(&leaf.leaf));
+    liveness.kernels.values().flat_map(|kernel| [any(&kernel.loads), any(&kernel.stores)]).collect()
 }
 
 /// Loads and stores of a lane that a piece would add.

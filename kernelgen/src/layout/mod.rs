@@ -4,10 +4,13 @@
 
 mod automatic;
 mod codec;
+mod copies;
 mod explicit;
 mod interference;
 #[cfg(test)]
 mod tests;
+
+pub use copies::InPlace;
 
 use crate::analyze::{Leaf, Liveness};
 use crate::config::model::{Codec, Layout, OPTIONAL, Order, Pipeline, Variant};

@@ -1,6 +1,6 @@
 //! No two leaves overlap and no two paths either, whatever the records and the layout.
 
-use super::{Assigned, Bits, Slot, StateLeaf, Table, automatic, explicit};
+use super::{Assigned, Bits, InPlace, Placement, Slot, StateLeaf, Table, automatic, explicit};
 use crate::analyze::{KernelTraffic, Leaf, Liveness};
 use crate::config::model::{Codec, Layout, Order, Placed, PlacedField, PlacedRow};
 use crate::config::quantity::LeafType;
@@ -63,6 +63,19 @@ fn liveness(leaves: &[StateLeaf], lives: &[Vec<usize>]) -> Liveness {
     Liveness { kernels: lives.iter().enumerate().map(kernel).collect(), ..Liveness::default() }
 }
 
+/// Kernels of which each copies some leaves to others, as far as it stores them.
+fn with_copies(mut liveness: Liveness, leaves: &[StateLeaf], copies: &[(usize, usize)]) -> Liveness {
+    for (traffic, of_kernel) in liveness.kernels.values_mut().zip(copies.chunks(COPIES)) {
+        let pairs = of_kernel.iter().filter_map(|(copy, source)| Some((leaves.get(*copy)?, leaves.get(*source)?)));
+        let stored = pairs.filter(|(copy, _)| traffic.stores.contains(&copy.leaf));
+        traffic.copies = stored.map(|(copy, source)| (copy.leaf.clone(), source.leaf.clone())).collect();
+    }
+    liveness
+}
+
+/// Most copies of a kernel.
+const COPIES: usize = 12;
+
 fn orders() -> impl Strategy<Value = Order> {
     let block = (1..=10u32).prop_map(|power| Order::Aosoa(1 << power));
     prop_oneof![Just(Order::Aos), Just(Order::Soa), block]
@@ -108,8 +121,13 @@ proptest! {
     /// Sharing: what is alive behind one kernel has bits of its own, whatever else has the same ones; and there are never more lanes
     /// than without.
     #[test]
-    fn what_lives_together_does_not_overlap(leaves in leaves(), lives in lives(), lane in lanes()) {
-        let liveness = liveness(&leaves, &lives);
+    fn what_lives_together_does_not_overlap(
+        leaves in leaves(),
+        lives in lives(),
+        copies in prop::collection::vec((0..24usize, 0..24usize), 0..6 * COPIES),
+        lane in lanes(),
+    ) {
+        let liveness = with_copies(liveness(&leaves, &lives), &leaves, &copies);
         let (tables, slots) = automatic::assign(vec![table(Order::Soa, lane)], &leaves, &liveness, true);
         for kernel in liveness.kernels.values() {
             let mut taken = BTreeSet::new();
@@ -218,6 +236,54 @@ fn a_ray_and_its_hit_share_words_in_the_table_of_rays() {
     assert!(slots[&leaves[0].leaf].overlaps(&slots[&leaves[2].leaf]));
     assert!(!slots[&leaves[1].leaf].overlaps(&slots[&leaves[2].leaf]));
     assert_eq!(slots[&leaves[3].leaf].table, 0);
+}
+
+/// The places of leaves, and those of what `copy` is spared: it copies some leaves to others, which live behind it as those did before.
+fn copied(leaves: &[StateLeaf], copies: &[(usize, usize)], before: &[usize], behind: &[usize]) -> (Placement, InPlace) {
+    let live_out = [before, behind].map(<[usize]>::to_vec);
+    let mut liveness = with_copies(liveness(leaves, &live_out), leaves, &[]);
+    let name = |index: usize| leaves[index].leaf.clone();
+    let traffic = &mut liveness.kernels["k1"];
+    traffic.loads = before.iter().map(|&index| name(index)).collect();
+    traffic.copies = copies.iter().map(|&(copy, source)| (name(copy), name(source))).collect();
+    traffic.only_copied = copies.iter().map(|&(_, source)| name(source)).collect();
+    let (tables, slots) = automatic::assign(vec![table(Order::Soa, 1)], leaves, &liveness, true);
+    let leaves = leaves.iter().map(|leaf| (leaf.leaf.clone(), leaf.clone())).collect();
+    let placement = Placement { tables, slots, leaves };
+    let in_place = placement.in_place(&liveness.kernels["k1"]);
+    (placement, in_place)
+}
+
+#[test]
+fn a_copy_lies_where_its_source_lay() {
+    let leaves = [
+        leaf(0, LeafType::Vec3, 96),
+        leaf(1, LeafType::Vec3, 96),
+        leaf(2, LeafType::Vec3, 96),
+        leaf(3, LeafType::Vec3, 96),
+    ];
+    let slot = |placement: &Placement, index: usize| placement.slots[&leaves[index].leaf].clone();
+    // Two sources and their copies, crosswise: without classes the first copy would go over the first source.
+    let (placement, in_place) = copied(&leaves, &[(2, 1), (3, 0)], &[0, 1], &[2, 3]);
+    assert_eq!(slot(&placement, 2), slot(&placement, 1));
+    assert_eq!(slot(&placement, 3), slot(&placement, 0));
+    assert_eq!((in_place.copies.len(), in_place.sources.len(), placement.tables[0].lanes), (2, 2, 6));
+    // A source that lives on keeps its place, and the copy has one of its own.
+    let (placement, in_place) = copied(&leaves, &[(2, 1)], &[0, 1], &[1, 2]);
+    assert!(!slot(&placement, 2).overlaps(&slot(&placement, 1)));
+    assert_eq!(in_place, InPlace::default());
+    // Of two copies that live together one is in place; the other needs the source in registers.
+    let (_, in_place) = copied(&leaves, &[(2, 1), (3, 1)], &[1], &[2, 3]);
+    assert_eq!((in_place.copies.len(), in_place.sources.len()), (1, 0));
+}
+
+#[test]
+fn copies_of_another_form_have_places_of_their_own() {
+    let in_place = |leaves: [StateLeaf; 2]| copied(&leaves, &[(1, 0)], &[0], &[1]).1;
+    let (wide, narrow) = (leaf(0, LeafType::U32, 32), leaf(1, LeafType::U32, 7));
+    assert_eq!(in_place([wide, narrow]), InPlace::default());
+    assert_eq!(in_place([leaf(0, LeafType::Vec3, 96), coded(1, vec![32, 32, 32])]), InPlace::default());
+    assert_eq!(in_place([coded(0, vec![24, 8]), coded(1, vec![24, 8])]).copies.len(), 1);
 }
 
 fn placed(text: &str) -> PlacedField {
