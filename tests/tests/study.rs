@@ -234,7 +234,7 @@ fn what_kernels_take_and_move_is_measured() {
     }
     let entries = |run: &Run| {
         let mut occupancy = run.measured.kernel_profile.as_ref().expect("studies profile kernels").occupancy.clone();
-        let resolved: f64 = occupancy.remove("resolve_connection").expect("a kernel of `pt`").iter().sum();
+        let resolved: f64 = occupancy.shift_remove("resolve_connection").expect("a kernel of `pt`").iter().sum();
         (occupancy, (resolved * run.measured.samples as f64).round())
     };
     let [first, rest @ ..] = results.runs.as_slice() else { panic!("four runs") };
