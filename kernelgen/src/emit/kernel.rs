@@ -153,15 +153,15 @@ impl Frame<'_> {
         }
         format!(
             "{declared}{locals}    \
-                 var path_taken = 0u;\n    \
+                 var carried_number = 0u;\n    \
                  if begun {{\n        \
                      path_id = {path};\n        \
-                     path_taken = path_numbers[path_id];\n\
+                     carried_number = path_numbers[path_id];\n\
              {loaded}\n{body}    }}\n\n    \
                  storageBarrier();\n    \
                  if begun {{\n        \
                      path_id = packed_slot({constant}, index, lane);\n        \
-                     path_numbers[path_id] = path_taken;\n\
+                     path_numbers[path_id] = carried_number;\n\
              {stored}    }}\n"
         )
     }
@@ -342,7 +342,7 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "state",
         "arguments",
         "path_count",
-        "path_taken",
+        "carried_number",
         "enqueue",
         "running",
         "pass_info",

@@ -190,9 +190,10 @@ pub(super) fn constants(pipeline: &Pipeline, effects: &Effects) -> Constants {
     known
 }
 
-/// `package::pass`: which path this is, its pixel and its sample. Where slots take several paths, they know their numbers.
-pub(super) fn pass(regenerate: bool) -> String {
-    format!("{PASS}{}", if regenerate { TAKEN_NUMBER } else { OWN_NUMBER })
+/// `package::pass`: which path this is, its pixel and its sample. Where slots take several paths, or paths change their
+/// slots, these are `numbered`: they know the numbers of their paths.
+pub(super) fn pass(numbered: bool) -> String {
+    format!("{PASS}{}", if numbered { TAKEN_NUMBER } else { OWN_NUMBER })
 }
 
 const OWN_NUMBER: &str = r"

@@ -447,9 +447,11 @@ fn paths_that_meet_behind_an_inner_loop_move_side_by_side() {
     let plan = with_an_inner_loop(&[("schedule.order", "packed")]);
     let emit = &kernel(&plan, "emit").module;
     let (before, after) = emit.split_once("    storageBarrier();\n").expect("waits");
-    assert!(before.contains("path_taken = path_numbers[path_id];"), "{emit}");
+    assert!(before.contains("carried_number = path_numbers[path_id];"), "{emit}");
     assert!(
-        after.contains("path_id = packed_slot(QUEUE_EMIT, index, lane);\n        path_numbers[path_id] = path_taken;")
+        after.contains(
+            "path_id = packed_slot(QUEUE_EMIT, index, lane);\n        path_numbers[path_id] = carried_number;"
+        )
     );
     assert!(kernel(&plan, "emit_first").module.contains("path_numbers[index] = index;"));
     assert!(kernel(&plan, "prepare_emit").module.contains("    note_whether_all_wait(QUEUE_EMIT);\n    "));
