@@ -187,6 +187,16 @@ fn roulette_keeps_the_mean() {
     }
 }
 
+/// Light vertices without eye walks leave the mean as it was, whatever the weights and the count of implicit samples.
+#[test]
+fn a_share_of_eye_walks_keeps_the_mean() {
+    let scene = closed_box();
+    for ((mis, counting), share) in [(BALANCE, 0.3), (POWER, 0.3), (AVERAGE, 0.5), (BALANCE, 0.0)] {
+        let job = box_job(&scene, "sbdpt", 32).set("mis", mis).set("counting", counting).set("walk_share", share);
+        assert_agree(&job.render(), &BOX, &format!("{mis}, {counting}, {share}"));
+    }
+}
+
 /// What ends walks that can no longer be joined leaves the mean as it was.
 #[test]
 fn early_ends_keep_the_mean() {

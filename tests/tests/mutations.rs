@@ -197,6 +197,10 @@ static FURNACE_BY_WHOLE_WALKS: Check = Check::new("sbdpt without joined walks, f
     constant(stages, job, ("sbdpt", 256), 2.952)
 });
 
+static FURNACE_BY_FEW_WALKS: Check = Check::new("sbdpt with a share of its eye walks, furnace", |stages| {
+    constant(stages, small(&furnace(0.8), 4).set("walk_share", 0.3), ("sbdpt", 256), 2.952)
+});
+
 static WHITE_METAL: Check = Check::new("pt, white metal reflects no more than it gets", |stages| {
     let scene = ball_in_a_constant_sky(Material::metal("metal", [1.0; 3], 0.7), 22.0);
     Verdict::at_most(&stages.render(small(&scene, 2).pipeline("pt").samples(256)), 1.0, BLOCK)
@@ -638,6 +642,13 @@ fn errors_of_bidirectional_weights() {
             old: "transported * weight,",
             new: "transported * (weight * select(1.0, 2.0, t == 1u)),",
             check: &NEAR_PANELS_FROM_BOTH_SIDES,
+        },
+        Mutation {
+            name: "connections that few eye walks make weigh as if all did",
+            module: "transport/connect",
+            old: "join_samples(s, t) * end.distance_squared",
+            new: "end.distance_squared",
+            check: &FURNACE_BY_FEW_WALKS,
         },
         Mutation {
             name: "the cosine at the surface is missing in the weight of splats",

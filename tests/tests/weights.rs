@@ -43,6 +43,7 @@ const ROW_SAMPLES: usize = 62;
 const ROW_MATERIAL: usize = 64;
 const ROW_EMITTER: usize = 76;
 const ROW_COINCIDENT: usize = 88;
+const ROW_SHARE: usize = 91;
 /// Materials in `all_materials`, and which of them are lights.
 const MATERIALS: usize = 12;
 const EMITTERS: [usize; 2] = [10, 11];
@@ -74,7 +75,7 @@ const FOLLOWS: &[Edit] = &[
     (
         "stage/shade_light_mis",
         "random::{DIMENSION_CHOICE, WALK_LIGHT, random4}",
-        "random::{DIMENSION_EMIT, WALK_EYE, random4}",
+        "random::{DIMENSION_CHOICE, DIMENSION_EMIT, WALK_EYE, WALK_LIGHT, random4}",
     ),
     (
         "stage/shade_light_mis",
@@ -94,7 +95,7 @@ const FOLLOWS: &[Edit] = &[
     (
         "transport/connect",
         "offer_strategy(eye, surface, end.segment, transported * weight, unweighted, s, t)",
-        "report_join(transported * weight, weight * end.distance_squared)",
+        "report_join(transported * weight, weight * (join_samples(s, t) * end.distance_squared))",
     ),
     (
         "stage/shade_eye",
@@ -131,6 +132,11 @@ const VARIES: &[Edit] = &[
         "transport/strategy",
         "import package::params::{only_edges, ",
         "import package::probe::weight_settings::{only_edges, ",
+    ),
+    (
+        "stage/shade_light_mis",
+        "import package::params::walk_share;",
+        "import package::probe::weight_settings::walk_share;",
     ),
     ("transport/strategy", "import package::tallies::", "import package::probe::weight_settings::"),
 ];
@@ -213,15 +219,17 @@ static TABLE: LazyLock<Vec<[u64; COLUMNS]>> = LazyLock::new(|| {
 });
 
 /// Check 8: along paths of one to six edges, through every kind of scattering to every kind of light, the weights of all strategies of a
-/// subset add up to one, times the samples that each takes; for any weights and any way of counting. A path that no strategy of the
-/// subset makes has none.
+/// subset add up to one, times the samples that each takes; for any weights, any way of counting and any share of light vertices that
+/// have eye walks. A path that no strategy of the subset makes has none.
 #[test]
 fn weights_of_a_path_sum_to_one() {
     assert_none_is_off(0..ROW_COINCIDENT);
+    assert_none_is_off(ROW_SHARE..ROW_SHARE + 3);
     let lights = [0, 8, 16, 24, 32].into_iter().zip([1, 2, 2, 2, 1]);
     assert_tested(lights.flat_map(|(row, shortest)| row + shortest..=row + 6));
     assert_tested(ROW_COUNTING..ROW_COUNTING + 9);
     assert_tested(ROW_EARLY_END..ROW_EARLY_END + 2);
+    assert_tested(ROW_SHARE..ROW_SHARE + 3);
     assert_tested(ROW_SUBSET..=ROW_NOTHING);
     assert_tested(ROW_DELTAS..ROW_DELTAS + 5);
     assert_tested(ROW_MATERIAL..ROW_MATERIAL + MATERIALS);
@@ -375,6 +383,25 @@ fn walks_in_a_white_furnace_take_the_rays_of_the_formula() {
         assert!(2 * rendering.visibility > joins * paths, "{counting}: only {} joining rays", rendering.visibility);
         let rates = &rendering.tallies[1..=FURNACE_EDGES as usize];
         assert!(rates.iter().all(|&rate| rate == 1.0), "{counting}: light paths end, {rates:?}");
+    }
+}
+
+/// In a white furnace every eye walk takes all its rays. With a share of 0 those of y_2 and beyond are missing; with one between, about
+/// that share of them is there.
+#[test]
+fn a_share_of_eye_walks_takes_its_share_of_rays() {
+    let scene = furnace(1.0);
+    let k = f64::from(FURNACE_EDGES);
+    let (others, always) = ((k - 1.0) * (k - 2.0) / 2.0, 2.0 * k - 1.0);
+    let paths = 16.0 * 16.0 * 64.0;
+    for share in [0.0, 0.25] {
+        let job = job(&scene).pipeline("sbdpt").edges(FURNACE_EDGES).size(16, 16).samples(64);
+        let rendering = job.set("counting", "first").set("walk_share", share).render();
+        assert_mean(&rendering, k, "walk_share");
+        let rays = (rendering.rays - rendering.visibility) as f64 / paths;
+        // Walks of 3, 2, 1 rays and none, each there or not.
+        let error = ((9.0 + 4.0 + 1.0) * share * (1.0 - share) / paths).sqrt();
+        assert!((rays - (always + share * others)).abs() <= 4.0 * error, "{share}: {rays} rays of walks a path");
     }
 }
 

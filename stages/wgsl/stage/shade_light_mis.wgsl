@@ -1,6 +1,7 @@
 import package::real::{real, vec3r};
 import package::state::{FLAGS_PARALLEL, Path, Walk};
-import package::outcome::{ENDED, SCATTERED};
+import package::outcome::{ENDED, SCATTERED, UNJOINED};
+import package::params::walk_share;
 import package::features::{HAS_DIRECTIONAL_LIGHT, HAS_SKY};
 import package::random::{DIMENSION_CHOICE, WALK_LIGHT, random4};
 import package::surface::surface::Surface;
@@ -36,6 +37,9 @@ fn shade_light_mis(light: ptr<function, Walk>, path: ptr<function, Path>) -> u32
     // The last vertex has an eye walk only where that may still meet light.
     if eye_limit(t) == 0u {
         return ENDED;
+    }
+    if walk_share < 1.0 && random4(WALK_LIGHT, t, DIMENSION_CHOICE).z >= walk_share {
+        return UNJOINED;
     }
     return SCATTERED;
 }

@@ -12,7 +12,7 @@ import package::light::light_vertex::{LightEnd, LightVertex};
 import package::transport::advance::{light_sums, surface_cosine};
 import package::transport::direct::offer_strategy;
 import package::transport::recursive_mis::{MisPartial, SMALLEST_SUM, closed_sum, join, scaled, weight_over};
-import package::transport::strategy::{eye_joins, implicit_term, light_joins};
+import package::transport::strategy::{eye_joins, implicit_term, join_samples, light_joins};
 
 /// The vertex of a light walk that an eye walk is joined to.
 struct LightSide {
@@ -46,7 +46,7 @@ fn connect(eye: ptr<function, Walk>, light: ptr<function, Walk>, surface: Surfac
     let eye_side = scaled(end.pdf * surface_cosine(surface, end.direction), eye_sum);
     let light_side = scaled(scattered.pdf * end.cosine, side.sum);
     let transported = eye.throughput * scattered.value * light.throughput * end.value;
-    let weight = weight_over(end.distance_squared, join(eye_side, light_side));
+    let weight = weight_over(join_samples(s, t) * end.distance_squared, join(eye_side, light_side));
     let unweighted = transported / max(end.distance_squared, SMALLEST_SUM);
     offer_strategy(eye, surface, end.segment, transported * weight, unweighted, s, t);
 }

@@ -48,7 +48,8 @@ fn source(inverse_density: real) -> real {
 }
 
 /// The sums after scattering at a vertex by a non-delta lobe, before the next vertex is known. `pdf` and `reverse_pdf` are per sr,
-/// `cosine` that of the new direction; `ended` is 0 where the strategy that joins the vertex before to this one is left out, else 1.
+/// `cosine` that of the new direction; `ended` are the samples of the strategy that joins the vertex before to this one, 0 where it is
+/// left out.
 fn scattered_sums(sums: MisPartial, pdf: real, reverse_pdf: real, cosine: real, ended: real) -> MisPartial {
     var next: MisPartial;
     next.b = scaled(cosine / pdf, join(scaled(ended, sums.a), scaled(reverse_pdf, sums.b)));

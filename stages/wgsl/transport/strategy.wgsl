@@ -3,7 +3,7 @@
 
 import package::real::real;
 import package::params::{counting, counting_first, counting_measured, early_end, max_edges};
-import package::params::{only_edges, only_eye_vertices, use_connection, use_explicit, use_implicit, use_particle};
+import package::params::{only_edges, only_eye_vertices, use_connection, use_explicit, use_implicit, use_particle, walk_share};
 import package::tallies::light_vertices_rate_sum;
 
 /// Whether a strategy takes part. With `only_edges` the bits of `only_eye_vertices` say which s do.
@@ -20,20 +20,26 @@ fn is_used(s: u32, t: u32) -> bool {
     return select(use_connection, use_explicit, t == 1u);
 }
 
-/// 1 or 0: whether the strategies that join x_s of an eye walk to light vertices beyond the next are used. With `only_edges` s decides.
-fn eye_joins(s: u32) -> real {
-    if only_edges > 0u {
-        return select(0.0, 1.0, s <= only_edges && is_used(s, only_edges - s));
-    }
-    return select(0.0, 1.0, select(use_connection, use_particle, s == 0u));
+/// Samples of strategy (s, t), t > 0, that are expected of each y_t: 1, `walk_share` where the eye walk itself is left to chance, 0 of
+/// a strategy that is left out.
+fn join_samples(s: u32, t: u32) -> real {
+    return select(0.0, select(1.0, walk_share, s > 0u && t > 1u), is_used(s, t));
 }
 
-/// 1 or 0: whether the strategies that join y_t of a light walk to eye vertices are used.
+/// Samples of the strategies that join x_s of an eye walk to light vertices beyond the next. With `only_edges` s decides which that is.
+fn eye_joins(s: u32) -> real {
+    if only_edges > 0u {
+        return select(0.0, join_samples(s, only_edges - s), s <= only_edges);
+    }
+    return join_samples(s, 2u);
+}
+
+/// Samples of the strategies that join y_t of a light walk to eye vertices.
 fn light_joins(t: u32) -> real {
     if only_edges > 0u {
-        return select(0.0, 1.0, t <= only_edges && is_used(only_edges - t, t));
+        return select(0.0, join_samples(only_edges - t, t), t <= only_edges);
     }
-    return select(0.0, 1.0, select(use_connection, use_explicit, t == 1u));
+    return join_samples(1u, t);
 }
 
 /// Vertices of the eye walk that belongs to light vertex `t` at most; its last ray only looks for light. 0: there is no such walk.
@@ -54,7 +60,7 @@ fn implicit_counts(s: u32, t: u32) -> bool {
 }
 
 /// Samples of the implicit strategy of `edges` edges for each light path: the eye walks that may reach so far. Measured: their
-/// expected number; realised: the largest possible, a constant that the picture is corrected for at the end.
+/// expected number; realised: as if no light path ended, a constant that the picture is corrected for at the end.
 fn implicit_samples(edges: u32) -> real {
     var samples = real(1.0);
     if counting != counting_first && edges > 1u {
@@ -63,6 +69,9 @@ fn implicit_samples(edges: u32) -> real {
         if counting == counting_measured {
             // Light vertices are numbered from 1: nothing is counted at 0.
             samples = light_vertices_rate_sum(last);
+        }
+        if walk_share < 1.0 {
+            samples = 1.0 + walk_share * (samples - 1.0);
         }
     }
     return samples;

@@ -7,7 +7,7 @@ import package::state::{Path, Walk};
 import package::features::HAS_SKY;
 import package::film::splat;
 // Those of the stages that are called need values too.
-import package::outcome::{ABSORBED, DONE, EMITTED, ENDED, SCATTERED};
+import package::outcome::{ABSORBED, DONE, EMITTED, ENDED, SCATTERED, UNJOINED};
 import package::params::{counting_first, max_edges};
 import package::random::{DIMENSION_LIGHT, DIMENSION_SCATTER, WALK_EYE, random4};
 import package::math::vector::max_component;
@@ -24,7 +24,7 @@ import package::surface::surface::{NO_LIGHT, Surface, surface_at, surface_on};
 import package::trace::accelerator::{trace_any, trace_closest};
 import package::trace::triangle::{NO_PRIM, RAY_INFINITY};
 import package::transport::dimension::random_extra;
-import package::transport::strategy::{implicit_samples, is_used};
+import package::transport::strategy::{implicit_samples, is_used, join_samples};
 import package::transport::walk::is_absorbed;
 import package::stage::start_eye::start_eye;
 import package::stage::start_light::start_light;
@@ -33,7 +33,7 @@ import package::stage::shade_light_mis::shade_light_mis;
 import package::stage::shade_eye::shade_eye;
 import package::stage::escape_eye::escape_eye;
 import package::probe::forced_path::{MOST_VERTICES, ends_at_infinity, force_hit, forced, forced_direction, forced_edges, forced_light, reported_hit, reported_join};
-import package::probe::weight_settings::{counting, draw_settings, early_end, light_vertices_rate, mis, subset};
+import package::probe::weight_settings::{counting, draw_settings, early_end, light_vertices_rate, mis, subset, walk_share};
 
 const COLUMNS: u32 = 16u;
 /// Eight rows for each kind of light, by edges.
@@ -57,6 +57,8 @@ const ROW_MATERIAL: u32 = 64u;
 const ROW_EMITTER: u32 = 76u;
 /// Vertices that are joined to one at the same place, by the weights.
 const ROW_COINCIDENT: u32 = 88u;
+/// By the share of light vertices that have eye walks: none, some, all.
+const ROW_SHARE: u32 = 91u;
 
 /// Tries for finding a delta lobe from the other side.
 const TRIES: u32 = 64u;
@@ -218,6 +220,7 @@ fn test_path() {
     count(ROW_LIGHT + 8u * light_kind(forced_light.light) + k, off);
     count(ROW_COUNTING + 3u * counting + mis, off);
     count(ROW_EARLY_END + select(0u, 1u, early_end), off);
+    count(ROW_SHARE + select(1u, select(0u, 2u, walk_share == 1.0), walk_share == 0.0 || walk_share == 1.0), off);
     count(ROW_SUBSET + subset, off);
     if makers == 0u {
         count(ROW_NOTHING, off);
@@ -248,7 +251,8 @@ fn count(row: u32, off: real) {
     splat(row * COLUMNS + column, vec3r(1.0));
 }
 
-/// Samples of the implicit strategy if light walks never end. Where they do, what `implicit_samples` says.
+/// Samples of the implicit strategy if light walks never end: the first eye walk, and its share of the others. Where they do, what
+/// `implicit_samples` says.
 fn samples_at_rate_one(edges: u32) -> real {
     if counting == counting_first || edges == 1u {
         return 1.0;
@@ -256,7 +260,8 @@ fn samples_at_rate_one(edges: u32) -> real {
     if light_vertices_rate(2u) < 1.0 {
         return implicit_samples(edges);
     }
-    return real(max(max_edges - edges + select(1u, 0u, early_end), 1u));
+    let others = max(max_edges - edges + select(1u, 0u, early_end), 1u) - 1u;
+    return 1.0 + walk_share * real(others);
 }
 
 /// Whether strategy (s, t) takes part and can make the path.
@@ -266,6 +271,9 @@ fn makes_path(s: u32, t: u32) -> bool {
     }
     if t == 0u {
         return forced_light.pdf > 0.0;
+    }
+    if join_samples(s, t) == 0.0 {
+        return false;
     }
     return !(s > 0u && forced[s].delta) && !(t > 1u && forced[s + 1u].delta);
 }

@@ -6,6 +6,7 @@ import package::math::elementary::power;
 var<private> mis: u32;
 var<private> counting: u32;
 var<private> early_end: bool;
+var<private> walk_share: real;
 var<private> use_implicit: bool;
 var<private> use_explicit: bool;
 var<private> use_particle: bool;
@@ -36,6 +37,8 @@ fn draw_settings(edges: u32, a: vec4r, b: vec4r, c: vec4r) {
     mis = u32(a.x * 3.0);
     counting = u32(a.y * 3.0);
     early_end = a.z < 0.5;
+    // A tenth none, a third all.
+    walk_share = select(min(1.5 * c.w, 1.0), 0.0, c.w < 0.1);
     survival = min(0.05 + 1.2 * a.w, 1.0);
     subset = u32(c.x * 3.0);
     let all = subset == 0u;
