@@ -6,6 +6,7 @@ use super::section::{Findings, Item, Section};
 use super::suggest;
 use crate::diagnostic::Diagnostic;
 use indexmap::IndexMap;
+use std::ops::RangeInclusive;
 
 const TYPES: [&str; 4] = ["u32", "real", "bool", "choice"];
 
@@ -17,7 +18,7 @@ pub fn read(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Para
     for item in &items {
         name::check("parameter", item, findings);
         let Some(section) = item.section(findings) else { continue };
-        section.allow(&["type", "value", "of", "max", "doc"], findings);
+        section.allow(&["type", "value", "of", "min", "max", "doc"], findings);
         let value = if is_declared(item) {
             value(item.name, &section, findings)
         } else {
@@ -49,22 +50,67 @@ fn value<'a>(name: &'a str, section: &Section<'a>, findings: &mut Findings) -> O
     let item = section.require("value", "every parameter has a value: `value = ..`", findings);
     // To its readers the value is the parameter.
     let item = item.map(|item| Item { path: section.path.clone(), name, ..item });
-    let is_choice = kind == Some(3);
-    if let Some(of) = section.get("of").filter(|_| kind.is_some() && !is_choice) {
-        let stray = Diagnostic::error("K0102", format!("unknown key `{}`", of.path))
-            .at(of.key, "only a choice has words to choose from")
-            .help("take it away, or write `type = \"choice\"`");
-        findings.push(stray);
-    }
-    match TYPES[kind?] {
+    let kind = TYPES[kind?];
+    refuse_stray(kind, section, findings);
+    match kind {
         "u32" => {
-            let largest = section.get("max").and_then(|max| max.integer(0..=u32::MAX, findings));
-            Some(ParamValue::U32(item?.integer(0..=largest.unwrap_or(u32::MAX), findings)?))
+            let range = integers(section, findings)?;
+            Some(ParamValue::U32(item?.integer(range, findings)?))
         }
-        "real" => Some(ParamValue::Real(item?.real(findings)?)),
+        "real" => {
+            let range = numbers(section, findings)?;
+            Some(ParamValue::Real(item?.real_within(range, findings)?))
+        }
         "bool" => Some(ParamValue::Bool(item?.boolean(findings)?)),
         _ => choice(section, item?, findings),
     }
+}
+
+/// K0102 for keys that say nothing about parameters of this type.
+fn refuse_stray(kind: &str, section: &Section<'_>, findings: &mut Findings) {
+    let is_number = ["u32", "real"].contains(&kind);
+    let choice = (kind == "choice", "only a choice has words to choose from", "`type = \"choice\"`");
+    let number = (is_number, "only a number has a range", "`type = \"u32\"` or `type = \"real\"`");
+    for (key, (fits, why, instead)) in [("of", choice), ("min", number), ("max", number)] {
+        if let Some(stray) = section.get(key).filter(|_| !fits) {
+            let unknown = Diagnostic::error("K0102", format!("unknown key `{}`", stray.path))
+                .at(stray.key, why)
+                .help(format!("take it away, or write {instead}"));
+            findings.push(unknown);
+        }
+    }
+}
+
+/// What a whole number may be: from `min` to `max`.
+fn integers(section: &Section<'_>, findings: &mut Findings) -> Option<RangeInclusive<u32>> {
+    let mut end = |key, default| section.get(key).map_or(Some(default), |end| end.integer(0..=u32::MAX, findings));
+    let range = end("min", 0)?..=end("max", u32::MAX)?;
+    not_empty(range, section, findings)
+}
+
+/// What a real number may be: from `min` to `max`, and never beyond f32.
+fn numbers(section: &Section<'_>, findings: &mut Findings) -> Option<RangeInclusive<f64>> {
+    let all = f64::from(f32::MIN)..=f64::from(f32::MAX);
+    let mut end = |key, default| section.get(key).map_or(Some(default), |end| end.real_within(all.clone(), findings));
+    let range = end("min", *all.start())?..=end("max", *all.end())?;
+    not_empty(range, section, findings)
+}
+
+/// The range, or K0107 where its ends are the wrong way round.
+fn not_empty<T: PartialOrd>(
+    range: RangeInclusive<T>,
+    section: &Section<'_>,
+    findings: &mut Findings,
+) -> Option<RangeInclusive<T>> {
+    if !range.is_empty() {
+        return Some(range);
+    }
+    let min = section.get("min")?;
+    let empty = Diagnostic::error("K0107", format!("`{}` is out of range", min.path))
+        .at(min.node.span, "larger than `max`")
+        .help("write the smaller end as `min`, the larger as `max`");
+    findings.push(empty);
+    None
 }
 
 fn choice(section: &Section<'_>, item: Item<'_>, findings: &mut Findings) -> Option<ParamValue> {

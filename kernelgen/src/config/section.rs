@@ -115,6 +115,19 @@ impl<'a> Item<'a> {
         }
     }
 
+    /// Its value as a number in a range; K0107 outside of it.
+    pub fn real_within(&self, range: RangeInclusive<f64>, findings: &mut Findings) -> Option<f64> {
+        let number = self.real(findings)?;
+        if range.contains(&number) {
+            return Some(number);
+        }
+        let outside = Diagnostic::error("K0107", format!("`{}` is out of range", self.path))
+            .at(self.node.span, "too small or too large")
+            .help(format!("write a number from {:?} to {:?}", range.start(), range.end()));
+        findings.push(outside);
+        None
+    }
+
     /// Its value as a truth value.
     pub fn boolean(&self, findings: &mut Findings) -> Option<bool> {
         match self.node.data {

@@ -52,6 +52,7 @@ impl Data {
         match self {
             Data::Text(_) => "a string",
             Data::Integer(_) => "an integer",
+            Data::Float(number) if !number.is_finite() => "no finite number",
             Data::Float(_) => "a number",
             Data::Bool(_) => "a truth value",
             Data::Date => "a date",
