@@ -12,9 +12,10 @@ use runtime::configs::Library;
 use runtime::device::{DeviceOptions, Gpu};
 use runtime::film::Sums;
 use runtime::image_file::Image;
+use runtime::pyramid;
 use runtime::render::{Rendered, Session, Settings, Until};
 use runtime::scene::{Accelerator, LoadOptions, Scene};
-use runtime::settings::{RenderFile, SetValue, Target};
+use runtime::settings::{Aov, RenderFile, SetValue, Target};
 use runtime::tallies::Tallied;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -78,8 +79,23 @@ pub struct Rendering {
     pub sums: Vec<i64>,
     /// What stages tallied, for each path; empty where they tally nothing.
     pub tallies: Vec<f64>,
+    /// Pictures of the strategies; empty where they are not recorded.
+    pub strategies: Vec<Strategy>,
     /// Samples per pixel.
     pub samples: u32,
+}
+
+/// What one strategy of a bidirectional pipeline makes: `s` vertices from the eye walk, `t` from the light walk.
+#[derive(Clone, Debug)]
+pub struct Strategy {
+    /// Vertices of the eye walk, the camera not counted.
+    pub s: u32,
+    /// Vertices of the light walk.
+    pub t: u32,
+    /// What it adds to the picture, with standard errors.
+    pub weighted: Pixels,
+    /// What it makes of the paths of its length alone, with standard errors.
+    pub unweighted: Pixels,
 }
 
 impl Job {
@@ -307,8 +323,26 @@ fn rendering(rendered: &Rendered) -> Rendering {
             Sums::Float(_) => Vec::new(),
         },
         tallies: rendered.totals.tallied.as_ref().map(rates).unwrap_or_default(),
+        strategies: strategies(rendered),
         samples: rendered.samples_taken,
     }
+}
+
+fn strategies(rendered: &Rendered) -> Vec<Strategy> {
+    let group = Aov::Strategies.to_string();
+    let means = pyramid::strategies(&|index| rendered.layer(&group, index));
+    let errors = pyramid::strategies(&|index| rendered.layer_standard_error(&group, index));
+    let pair = |(mean, error): (pyramid::Strategy, pyramid::Strategy)| {
+        assert_eq!((mean.s, mean.t), (error.s, error.t), "a strategy has no standard errors");
+        let with_errors = |mean: &[f32], error: &[f32]| pixels(rendered.size, mean, error);
+        Strategy {
+            s: mean.s,
+            t: mean.t,
+            weighted: with_errors(&mean.weighted, &error.weighted),
+            unweighted: with_errors(&mean.unweighted, &error.unweighted),
+        }
+    };
+    means.into_iter().zip(errors).map(pair).collect()
 }
 
 fn rates(tallied: &Tallied) -> Vec<f64> {

@@ -244,6 +244,42 @@ fn every_strategy_alone_gives_the_image_of_pt() {
     }
 }
 
+/// Check 9, by the pictures of strategies that one render keeps: each, unweighted, is the image of `pt` of its length, also where only
+/// a share of the light vertices has an eye walk; weighted they add up to the picture.
+#[test]
+fn pictures_of_strategies_are_those_of_pt_and_add_up() {
+    let scene = between_plates();
+    let up_to = |edges: u32| plates_job(&scene, "pt", edges, 128).seed(edges).render();
+    let (shorter, longest) = (up_to(3), &*PLATES);
+    let expected = difference(&longest.pixels, &shorter.pixels);
+    for share in [1.0, 0.5] {
+        let job = plates_job(&scene, "sbdpt", 4, 192).set("counting", "first").set("walk_share", share);
+        let rendering = job.set("record_strategies", true).render();
+        let of_length_four = rendering.strategies.iter().filter(|strategy| strategy.s + strategy.t == 4);
+        let alone: Vec<_> = of_length_four.map(|strategy| (strategy.s, &strategy.unweighted)).collect();
+        assert_eq!(alone.iter().map(|(s, _)| *s).collect::<Vec<_>>(), [4, 3, 2, 1, 0]);
+        for (s, picture) in alone {
+            assert_same(picture, &expected, BLOCK, 0.03, &format!("({s}, {}), share {share}", 4 - s));
+        }
+        assert_add_up(&rendering);
+    }
+}
+
+/// The weighted pictures of the strategies are the picture, to what f32 sums lose.
+#[track_caller]
+fn assert_add_up(rendering: &Rendering) {
+    let mut sums = vec![[0.0; 3]; rendering.pixels.rgb.len()];
+    for strategy in &rendering.strategies {
+        for (sum, part) in sums.iter_mut().flatten().zip(strategy.weighted.rgb.iter().flatten()) {
+            *sum += f64::from(*part);
+        }
+    }
+    for (sum, whole) in sums.iter().flatten().zip(rendering.pixels.rgb.iter().flatten()) {
+        let whole = f64::from(*whole);
+        assert!((sum - whole).abs() <= 1e-4 * whole + 1e-6, "the strategies add up to {sum}, not to {whole}");
+    }
+}
+
 /// A floor and a ceiling that do not touch, in the light of a panel between them and out of the picture, which reflects.
 fn between_plates() -> BuiltScene {
     let mut scene = SceneBuilder::new();

@@ -647,7 +647,7 @@ fn errors_of_bidirectional_weights() {
             name: "connections that few eye walks make weigh as if all did",
             module: "transport/connect",
             old: "join_samples(s, t) * end.distance_squared",
-            new: "end.distance_squared",
+            new: "1.0 * end.distance_squared",
             check: &FURNACE_BY_FEW_WALKS,
         },
         Mutation {

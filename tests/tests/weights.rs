@@ -95,7 +95,7 @@ const FOLLOWS: &[Edit] = &[
     (
         "transport/connect",
         "offer_strategy(eye, surface, end.segment, transported * weight, unweighted, s, t)",
-        "report_join(transported * weight, weight * (join_samples(s, t) * end.distance_squared))",
+        "report_join(transported * weight, weight * own)",
     ),
     (
         "stage/shade_eye",

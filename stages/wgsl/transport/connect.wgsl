@@ -46,8 +46,9 @@ fn connect(eye: ptr<function, Walk>, light: ptr<function, Walk>, surface: Surfac
     let eye_side = scaled(end.pdf * surface_cosine(surface, end.direction), eye_sum);
     let light_side = scaled(scattered.pdf * end.cosine, side.sum);
     let transported = eye.throughput * scattered.value * light.throughput * end.value;
-    let weight = weight_over(join_samples(s, t) * end.distance_squared, join(eye_side, light_side));
-    let unweighted = transported / max(end.distance_squared, SMALLEST_SUM);
+    let own = join_samples(s, t) * end.distance_squared;
+    let weight = weight_over(own, join(eye_side, light_side));
+    let unweighted = transported / max(own, SMALLEST_SUM);
     offer_strategy(eye, surface, end.segment, transported * weight, unweighted, s, t);
 }
 
