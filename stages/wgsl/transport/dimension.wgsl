@@ -11,7 +11,7 @@
 //! | light, emitter         | DIMENSION_EMIT       | place on the light            | choice of the light         |
 //! | light, emitter         | DIMENSION_DIRECTION  | direction, or place on the disk | side of a triangle, -     |
 //! | light, emitter         | DIMENSION_SKY        | row, column of the sky's texel | threshold, -               |
-//! | light, surface         | DIMENSION_CHOICE     | lens                          | whether an eye walk joins it, - |
+//! | light, surface         | DIMENSION_CHOICE     | lens                          | eye walk or none, -         |
 
 import package::real::vec4r;
 import package::features::HAS_SKY;
