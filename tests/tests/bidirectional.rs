@@ -245,21 +245,21 @@ fn every_strategy_alone_gives_the_image_of_pt() {
 }
 
 /// Check 9, by the pictures of strategies that one render keeps: each, unweighted, is the image of `pt` of its length, also where only
-/// a share of the light vertices has an eye walk; weighted they add up to the picture.
+/// a share of the light vertices has an eye walk, or two share one; weighted they add up to the picture.
 #[test]
 fn pictures_of_strategies_are_those_of_pt_and_add_up() {
     let scene = between_plates();
     let up_to = |edges: u32| plates_job(&scene, "pt", edges, 128).seed(edges).render();
     let (shorter, longest) = (up_to(3), &*PLATES);
     let expected = difference(&longest.pixels, &shorter.pixels);
-    for share in [1.0, 0.5] {
-        let job = plates_job(&scene, "sbdpt", 4, 192).set("counting", "first").set("walk_share", share);
+    for (pipeline, share) in [("sbdpt", 1.0), ("sbdpt", 0.5), ("sbdpt_pairs", 1.0)] {
+        let job = plates_job(&scene, pipeline, 4, 192).set("counting", "first").set("walk_share", share);
         let rendering = job.set("record_strategies", true).render();
         let of_length_four = rendering.strategies.iter().filter(|strategy| strategy.s + strategy.t == 4);
         let alone: Vec<_> = of_length_four.map(|strategy| (strategy.s, &strategy.unweighted)).collect();
         assert_eq!(alone.iter().map(|(s, _)| *s).collect::<Vec<_>>(), [4, 3, 2, 1, 0]);
         for (s, picture) in alone {
-            assert_same(picture, &expected, BLOCK, 0.03, &format!("({s}, {}), share {share}", 4 - s));
+            assert_same(picture, &expected, BLOCK, 0.03, &format!("({s}, {}), {pipeline}, share {share}", 4 - s));
         }
         assert_add_up(&rendering);
     }

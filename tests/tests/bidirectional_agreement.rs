@@ -197,6 +197,33 @@ fn a_share_of_eye_walks_keeps_the_mean() {
     }
 }
 
+/// Eye walks that are joined to two light vertices make the same image, whatever the weights and the count of implicit samples, with
+/// paths of an odd and of an even number of edges; also where half of them only look for light.
+#[test]
+fn eye_walks_of_pairs_keep_the_image() {
+    let scene = closed_box();
+    let job = box_job(&scene, "sbdpt_pairs", 48);
+    for (mis, counting) in [BALANCE, POWER, AVERAGE] {
+        let rendering = job.clone().set("mis", mis).set("counting", counting).render();
+        assert_agree(&rendering, &BOX, &format!("{mis}, {counting}"));
+    }
+    assert_agree(&job.clone().set("early_end", true).render(), &BOX, "early_end");
+    assert_agree(&job.clone().set("roulette", true).set("roulette_start", 1).render(), &BOX, "roulette");
+    let without_first = job.clone().set("use_explicit", false).render();
+    assert_agree(&without_first, &BOX, "where the first of a pair is not joined");
+    let expected = box_job(&scene, "pt", 256).edges(5).seed(1).render();
+    assert_agree(&job.edges(5).render(), &expected, "five edges");
+}
+
+/// Eye walks of pairs under a sun and a sky, where most light walks end before the second vertex.
+#[test]
+fn eye_walks_of_pairs_keep_the_image_in_the_open() {
+    let scene = sun_and_sky();
+    let job = scene.job().size(32, 32).edges(4);
+    let expected = job.clone().pipeline("pt").samples(64).render();
+    assert_agree(&job.pipeline("sbdpt_pairs").samples(48).render(), &expected, "sbdpt_pairs and pt");
+}
+
 /// What ends walks that can no longer be joined leaves the mean as it was.
 #[test]
 fn early_ends_keep_the_mean() {

@@ -24,7 +24,7 @@ fn assert_renders(job: &Job, what: &str) {
 #[test]
 fn every_pipeline_renders_one_sample() {
     let pipelines = pipelines();
-    for started in ["lt", "nee", "pt", "rays", "sbdpt", "sbdpt_seed"] {
+    for started in ["lt", "nee", "pt", "rays", "sbdpt", "sbdpt_pairs", "sbdpt_seed"] {
         assert!(pipelines.contains(&started), "pipeline `{started}` is shipped and can be started");
     }
     for pipeline in pipelines {

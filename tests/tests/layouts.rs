@@ -49,7 +49,7 @@ fn states_are_as_small_as_they_can_be() {
 #[test]
 fn every_layout_gives_the_same_bits() {
     let mut fitting = BTreeSet::new();
-    for pipeline in ["nee", "pt", "lt", "sbdpt", "sbdpt_seed"] {
+    for pipeline in ["nee", "pt", "lt", "sbdpt", "sbdpt_seed", "sbdpt_pairs"] {
         let expected = job(pipeline).layout("aos").render();
         assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
         // Every layout with the two pipelines that most is built on; with the others those that place fields most unlike `aos`.

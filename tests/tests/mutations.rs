@@ -201,6 +201,10 @@ static FURNACE_BY_FEW_WALKS: Check = Check::new("sbdpt with a share of its eye w
     constant(stages, small(&furnace(0.8), 4).set("walk_share", 0.3), ("sbdpt", 256), 2.952)
 });
 
+static FURNACE_BY_PAIRS: Check = Check::new("sbdpt_pairs, furnace", |stages| {
+    constant(stages, small(&furnace(0.8), 5), ("sbdpt_pairs", 192), 3.3616)
+});
+
 static WHITE_METAL: Check = Check::new("pt, white metal reflects no more than it gets", |stages| {
     let scene = ball_in_a_constant_sky(Material::metal("metal", [1.0; 3], 0.7), 22.0);
     Verdict::at_most(&stages.render(small(&scene, 2).pipeline("pt").samples(256)), 1.0, BLOCK)
@@ -649,6 +653,20 @@ fn errors_of_bidirectional_weights() {
             old: "join_samples(s, t) * end.distance_squared",
             new: "1.0 * end.distance_squared",
             check: &FURNACE_BY_FEW_WALKS,
+        },
+        Mutation {
+            name: "eye walks that two light vertices share are counted for both",
+            module: "stage/shade_light_mis",
+            old: "if first_joined(t) == t {\n",
+            new: "if t > 0u {\n",
+            check: &FURNACE_BY_PAIRS,
+        },
+        Mutation {
+            name: "an eye walk is joined to the first light vertex of its pair twice",
+            module: "stage/shade_eye_pair",
+            old: "connect(eye, light, surface, bsdf, sums, s, last)",
+            new: "connect(eye, first, surface, bsdf, sums, s, t)",
+            check: &FURNACE_BY_PAIRS,
         },
         Mutation {
             name: "the cosine at the surface is missing in the weight of splats",

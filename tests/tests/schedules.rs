@@ -67,14 +67,16 @@ fn every_schedule_gives_the_same_bits_of_sbdpt() {
 }
 
 #[test]
-fn unlike_schedules_give_the_same_bits_of_the_seed() {
-    schedules("sbdpt_seed", |name| ["uncompacted", "walks"].contains(&name));
+fn unlike_schedules_give_the_same_bits_of_variants() {
+    for pipeline in ["sbdpt_seed", "sbdpt_pairs"] {
+        schedules(pipeline, |name| ["uncompacted", "walks"].contains(&name));
+    }
 }
 
 /// Walks of one light vertex end together, or paths are in all phases: nothing else differs.
 #[test]
 fn flat_rounds_give_the_same_bits() {
-    for pipeline in ["sbdpt", "sbdpt_seed"] {
+    for pipeline in ["sbdpt", "sbdpt_seed", "sbdpt_pairs"] {
         let expected = job(pipeline).render();
         for schedule in ["wavefront", "ordered"] {
             let flat = job(pipeline).schedule(schedule).set("schedule.loops", "flat");

@@ -10,7 +10,7 @@ use tests::rendering::{Job, shipped};
 /// Every layout that keeps all bits has been held to be equal without garbage; compact is the one with the least slack.
 #[test]
 fn garbage_in_what_is_not_loaded_changes_nothing() {
-    for pipeline in ["nee", "pt", "lt", "sbdpt", "sbdpt_seed"] {
+    for pipeline in ["nee", "pt", "lt", "sbdpt", "sbdpt_seed", "sbdpt_pairs"] {
         let job = Job::of_file(shipped("light_kinds")).pipeline(pipeline).layout("compact").size(24, 16).samples(2);
         let clean = job.clone().fixed_point().render();
         assert!(clean.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");

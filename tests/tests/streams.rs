@@ -45,7 +45,7 @@ fn capacity_and_queue_kind_do_not_meet() {
 /// Paths wait as they came or in the order of their slots, and whoever appends them does.
 #[test]
 fn every_order_of_queues_gives_the_same_bits() {
-    for pipeline in ["pt", "sbdpt", "sbdpt_seed"] {
+    for pipeline in ["pt", "sbdpt", "sbdpt_seed", "sbdpt_pairs"] {
         let expected = job(pipeline).render();
         assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
         let arrival = [("workgroup", "arrival")];

@@ -194,6 +194,8 @@ pub struct Stage {
     pub rays: Option<RayKind>,
     /// Keys by which a schedule may sort the paths that wait for it, and their WGSL functions: `sort.material = "material_key"`.
     pub sort: IndexMap<String, Spanned<String>>,
+    /// The stage that it runs before in a round, where it is not listed so.
+    pub before: Option<Spanned<String>>,
 }
 
 /// Kinds of traced ray. Walk rays are reported as primary, secondary and deep by the round in which they are traced, or by the turn of

@@ -250,7 +250,7 @@ fn stages(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Stage>
     for item in top.entries("stages", findings) {
         name::check("stage", &item, findings);
         let Some(section) = item.section(findings) else { continue };
-        section.allow(&["entry", "with", "on", "rays", "sort"], findings);
+        section.allow(&["entry", "with", "on", "rays", "sort", "before"], findings);
         let own_name = Spanned { value: item.name.to_owned(), span: item.key };
         let entry = section.get("entry").and_then(|entry| entry.text(findings));
         let stage = Stage {
@@ -260,8 +260,21 @@ fn stages(top: &Section<'_>, findings: &mut Findings) -> IndexMap<String, Stage>
             on: outcomes(&section, findings),
             rays: rays(&section, findings),
             sort: names(&section, "sort", "key", findings),
+            before: section.get("before").and_then(|before| before.text(findings)),
         };
         stages.insert(item.name.to_owned(), stage);
+    }
+    in_order(stages)
+}
+
+/// The stages in the order in which they run: as they are listed, but those with `before` directly before the stage that it names. What
+/// cannot be so stays where it is.
+fn in_order(mut stages: IndexMap<String, Stage>) -> IndexMap<String, Stage> {
+    let moved = stages.iter().filter_map(|(name, stage)| Some((name.clone(), stage.before.as_ref()?.value.clone())));
+    let moved: Vec<(String, String)> = moved.collect();
+    for (name, before) in moved {
+        let (Some(from), Some(target)) = (stages.get_index_of(&name), stages.get_index_of(&before)) else { continue };
+        stages.move_index(from, if from < target { target - 1 } else { target });
     }
     stages
 }

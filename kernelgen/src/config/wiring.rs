@@ -73,6 +73,21 @@ fn check_stages(pipeline: &Pipeline, findings: &mut Findings) {
             check_known(("K0206", "instance"), instance, &pipeline.state, findings);
         }
     }
+    check_order(pipeline, findings);
+}
+
+/// Stages run before those that they say.
+fn check_order(pipeline: &Pipeline, findings: &mut Findings) {
+    for (index, (name, stage)) in pipeline.stages.iter().enumerate() {
+        let Some(before) = &stage.before else { continue };
+        check_known(("K0202", "stage"), before, &pipeline.stages, findings);
+        if pipeline.stages.get_index_of(&before.value).is_some_and(|target| target <= index) {
+            let circle = Diagnostic::error("K0231", format!("stage `{name}` cannot run before `{}`", before.value))
+                .at(before.span, "it comes after that, or is that stage itself")
+                .help("take one `before` of the circle away");
+            findings.push(circle);
+        }
+    }
 }
 
 /// Groups of fused stages: a stage is in one of them at most.

@@ -184,6 +184,8 @@ pub(super) struct Analysed {
     pub facts: StageFacts,
     /// Whether the text may have lost code to an absent effect.
     pub pruned: bool,
+    /// Outcomes that the text names, in upper case, whether or not parameters let it return them.
+    pub named: BTreeSet<String>,
     /// Whether it counts something in a tally.
     pub counts: bool,
 }
@@ -356,9 +358,11 @@ impl Wirer<'_> {
         let pruned = linked.constants_seen.iter().any(|name| self.is_absent(name));
         self.wiring.effects_seen.extend(linked.constants_seen);
         let counts = linked.items.iter().any(|(module, item)| module == "tallies" && item.starts_with("count_"));
+        let named = linked.mentioned.into_iter().filter(|(module, _)| module == "outcome");
+        let named = named.map(|(_, item)| item).collect();
         let of_film = linked.items.into_iter().filter(|(module, _)| module == "film");
         self.wiring.splats.extend(of_film.map(|(_, item)| item));
-        Ok(Analysed { entry, signature, facts, pruned, counts })
+        Ok(Analysed { entry, signature, facts, pruned, named, counts })
     }
 
     fn check_outcomes(&mut self, name: &str, stage: &Stage, analysed: &Analysed) -> Result<(), Vec<Diagnostic>> {
@@ -388,7 +392,7 @@ impl Wirer<'_> {
                 Some(_) => {}
             }
         }
-        let never = stage.on.iter().filter(|(outcome, _)| !returned.contains_key(*outcome));
+        let never = stage.on.iter().filter(|(outcome, _)| !analysed.named.contains(&outcome.to_uppercase()));
         if !analysed.pruned {
             self.wiring.warnings.extend(never.map(|(outcome, target)| {
                 let message = format!("stage `{name}` never returns outcome `{outcome}`");

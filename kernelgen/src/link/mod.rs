@@ -15,7 +15,7 @@ pub use source_map::SourceMap;
 use crate::diagnostic::Diagnostic;
 use crate::plan::Access;
 use crate::source::{FileId, Sources, Span};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Module path without `package::`, segments joined by `::`, to its text: `bsdf::lambert`.
 pub type Modules = BTreeMap<String, FileId>;
@@ -69,6 +69,8 @@ pub struct Linked {
     pub items: Vec<(String, String)>,
     /// Constants of `features` that decided a cut or are still mentioned, by item name.
     pub constants_seen: Vec<String>,
+    /// Imports that the reached declarations mention, be it in branches that are cut: (module path, item).
+    pub mentioned: BTreeSet<(String, String)>,
 }
 
 /// Links everything that `root` reaches.

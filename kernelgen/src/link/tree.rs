@@ -314,7 +314,21 @@ impl<'a> Linker<'a> {
             bindings: printer.bindings,
             items: names.filter(|(_, item)| !item.is_empty()).collect(),
             constants_seen: seen.into_iter().collect(),
+            mentioned: self.mentioned_imports(reached),
         })
+    }
+
+    fn mentioned_imports(&self, reached: &Reached) -> BTreeSet<(String, String)> {
+        let of_declaration = |key: &Key| {
+            let module = Rc::clone(&self.parsed[key.0]);
+            let tokens = module.declarations[key.1].tokens.clone();
+            let imported = tokens.filter_map(move |token| {
+                let name = module.word(token);
+                Some((module.imports.get(name)?.module.clone(), name.to_owned()))
+            });
+            imported.collect::<Vec<_>>()
+        };
+        reached.order.iter().flat_map(of_declaration).collect()
     }
 }
 

@@ -7,13 +7,13 @@ import package::light::sky::{sky_pdf_w, sky_radiance};
 import package::transport::advance::eye_sums;
 import package::transport::implicit::add_implicit;
 import package::transport::recursive_mis::{join, scaled};
-import package::transport::strategy::{implicit_counts, is_used};
+import package::transport::strategy::{first_joined, implicit_counts, is_used};
 
 /// Ends an eye walk in the sky: the implicit strategy for the light at infinity, weighted against sampling its direction.
 fn escape_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     if HAS_SKY {
         let edges = path.eye_length + 1u;
-        if implicit_counts(edges, path.light_length) {
+        if implicit_counts(edges, first_joined(path.light_length)) {
             var rivals = real(0.0);
             if edges > 1u {
                 let pdf_sky = sky_pdf_w(eye.direction);

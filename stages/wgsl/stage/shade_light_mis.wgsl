@@ -13,14 +13,16 @@ import package::tallies::count_light_vertices;
 import package::transport::advance::{light_sums, meet, set_sums, surface_cosine};
 import package::transport::direct::offer_particle_strategy;
 import package::transport::recursive_mis::{MisPartial, closed_sum, scaled, weight_over};
-import package::transport::strategy::{eye_limit, implicit_term, is_used, light_joins};
+import package::transport::strategy::{eye_limit, first_joined, implicit_term, is_used, light_joins};
 import package::transport::walk::arrive;
 
 /// The light walk arrives at y_t, t >= 2: joins it to the camera (path of t edges), whatever pixel that is.
 fn shade_light_mis(light: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     path.light_length += 1u;
     let t = path.light_length;
-    count_light_vertices(t);
+    if first_joined(t) == t {
+        count_light_vertices(t);
+    }
     let surface = arrive(light);
     var parallel = false;
     if HAS_DIRECTIONAL_LIGHT || HAS_SKY {
@@ -35,7 +37,7 @@ fn shade_light_mis(light: ptr<function, Walk>, path: ptr<function, Path>) -> u32
         }
     }
     // The last vertex has an eye walk only where that may still meet light.
-    if eye_limit(t) == 0u {
+    if eye_limit(first_joined(t)) == 0u {
         return ENDED;
     }
     if walk_share < 1.0 && random4(WALK_LIGHT, t, DIMENSION_CHOICE).z >= walk_share {

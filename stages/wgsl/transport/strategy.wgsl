@@ -3,7 +3,7 @@
 
 import package::real::real;
 import package::params::{counting, counting_first, counting_measured, early_end, max_edges};
-import package::params::{only_edges, only_eye_vertices, use_connection, use_explicit, use_implicit, use_particle, walk_share};
+import package::params::{only_edges, only_eye_vertices, use_connection, use_explicit, use_implicit, use_particle, walk_share, walk_vertices};
 import package::tallies::light_vertices_rate_sum;
 
 /// Whether a strategy takes part. With `only_edges` the bits of `only_eye_vertices` say which s do.
@@ -42,7 +42,17 @@ fn light_joins(t: u32) -> real {
     return join_samples(1u, t);
 }
 
-/// Vertices of the eye walk that belongs to light vertex `t` at most; its last ray only looks for light. 0: there is no such walk.
+/// Whether x_s is joined to y_t, t > 0, where the two meet.
+fn is_joined(s: u32, t: u32) -> bool {
+    return s + t <= max_edges && is_used(s, t);
+}
+
+/// The first of the light vertices, `walk_vertices` in a row, that the eye walk of y_t belongs to; it stands for the walk.
+fn first_joined(t: u32) -> u32 {
+    return t - (t - 1u) % walk_vertices;
+}
+
+/// Vertices of the eye walk that begins with light vertex `t` at most; its last ray only looks for light. 0: there is no such walk.
 fn eye_limit(t: u32) -> u32 {
     if t == 1u {
         return max_edges;
@@ -65,9 +75,9 @@ fn implicit_samples(edges: u32) -> real {
     var samples = real(1.0);
     if counting != counting_first && edges > 1u {
         let last = last_eye_walk(edges);
-        samples = real(last);
+        samples = real((last + walk_vertices - 1u) / walk_vertices);
         if counting == counting_measured {
-            // Light vertices are numbered from 1: nothing is counted at 0.
+            // Light vertices are numbered from 1, and counted where an eye walk begins with them.
             samples = light_vertices_rate_sum(last);
         }
         if walk_share < 1.0 {

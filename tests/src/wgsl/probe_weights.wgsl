@@ -33,7 +33,7 @@ import package::stage::shade_light_mis::shade_light_mis;
 import package::stage::shade_eye::shade_eye;
 import package::stage::escape_eye::escape_eye;
 import package::probe::forced_path::{MOST_VERTICES, ends_at_infinity, force_hit, forced, forced_direction, forced_edges, forced_light, reported_hit, reported_join};
-import package::probe::weight_settings::{counting, draw_settings, early_end, light_vertices_rate, mis, subset, walk_share};
+import package::probe::weight_settings::{counting, draw_settings, early_end, light_vertices_rate, mis, subset, walk_share, walk_vertices};
 
 const COLUMNS: u32 = 16u;
 /// Eight rows for each kind of light, by edges.
@@ -59,6 +59,8 @@ const ROW_EMITTER: u32 = 76u;
 const ROW_COINCIDENT: u32 = 88u;
 /// By the share of light vertices that have eye walks: none, some, all.
 const ROW_SHARE: u32 = 91u;
+/// Two light vertices share an eye walk.
+const ROW_PAIRS: u32 = 94u;
 
 /// Tries for finding a delta lobe from the other side.
 const TRIES: u32 = 64u;
@@ -221,6 +223,9 @@ fn test_path() {
     count(ROW_COUNTING + 3u * counting + mis, off);
     count(ROW_EARLY_END + select(0u, 1u, early_end), off);
     count(ROW_SHARE + select(1u, select(0u, 2u, walk_share == 1.0), walk_share == 0.0 || walk_share == 1.0), off);
+    if walk_vertices == 2u {
+        count(ROW_PAIRS, off);
+    }
     count(ROW_SUBSET + subset, off);
     if makers == 0u {
         count(ROW_NOTHING, off);
@@ -260,7 +265,11 @@ fn samples_at_rate_one(edges: u32) -> real {
     if light_vertices_rate(2u) < 1.0 {
         return implicit_samples(edges);
     }
-    let others = max(max_edges - edges + select(1u, 0u, early_end), 1u) - 1u;
+    let last = max(max_edges - edges + select(1u, 0u, early_end), 1u);
+    var others = 0u;
+    for (var t = 2u; t <= last; t += 1u) {
+        others += select(0u, 1u, walk_vertices == 1u || t % 2u == 1u);
+    }
     return 1.0 + walk_share * real(others);
 }
 

@@ -7,6 +7,7 @@ var<private> mis: u32;
 var<private> counting: u32;
 var<private> early_end: bool;
 var<private> walk_share: real;
+var<private> walk_vertices: u32 = 1u;
 var<private> use_implicit: bool;
 var<private> use_explicit: bool;
 var<private> use_particle: bool;
@@ -23,10 +24,10 @@ fn light_vertices_rate(t: u32) -> real {
     return power(survival, real(t - 1u));
 }
 
-/// Their sum up to vertex t.
+/// Their sum up to vertex t, where eye walks begin with these.
 fn light_vertices_rate_sum(t: u32) -> real {
     var sum = real(0.0);
-    for (var i = 1u; i <= t; i += 1u) {
+    for (var i = 1u; i <= t; i += walk_vertices) {
         sum += light_vertices_rate(i);
     }
     return sum;
@@ -39,6 +40,11 @@ fn draw_settings(edges: u32, a: vec4r, b: vec4r, c: vec4r) {
     early_end = a.z < 0.5;
     // A tenth none, a third all.
     walk_share = select(min(1.5 * c.w, 1.0), 0.0, c.w < 0.1);
+    walk_vertices = 1u;
+    if c.w > 0.8 {
+        // All have an eye walk, half of them that of the one before.
+        walk_vertices = 2u;
+    }
     survival = min(0.05 + 1.2 * a.w, 1.0);
     subset = u32(c.x * 3.0);
     let all = subset == 0u;
