@@ -197,8 +197,8 @@ fn a_share_of_eye_walks_keeps_the_mean() {
     }
 }
 
-/// Eye walks that are joined to two light vertices make the same image, whatever the weights and the count of implicit samples, with
-/// paths of an odd and of an even number of edges; also where half of them only look for light.
+/// Eye walks that are joined to two light vertices make the same image, whatever the weights, the count of implicit samples and the
+/// ends of walks, where only the second of a pair is joined, and with paths of an odd number of edges.
 #[test]
 fn eye_walks_of_pairs_keep_the_image() {
     let scene = closed_box();
