@@ -187,6 +187,25 @@ fn roulette_keeps_the_mean() {
     }
 }
 
+/// Walks that end by a chance that weights know of leave the mean as it was, whatever the weights, the count of implicit samples and the
+/// other ways of saving eye walks, and beside glass, which is spared.
+#[test]
+fn mortal_walks_keep_the_mean() {
+    let scene = closed_box();
+    let mortal = |job: Job| job.set("eye_survival", 0.4).set("light_survival", 0.6);
+    for (mis, counting) in [BALANCE, POWER, AVERAGE] {
+        let job = box_job(&scene, "sbdpt", 48).set("mis", mis).set("counting", counting);
+        assert_agree(&mortal(job).render(), &BOX, &format!("{mis}, {counting}"));
+    }
+    let few = box_job(&scene, "sbdpt", 64).set("walk_share", 0.5).set("roulette", true).set("roulette_start", 1);
+    assert_agree(&mortal(few).render(), &BOX, "walk_share, roulette");
+    assert_agree(&mortal(box_job(&scene, "sbdpt_pairs", 64)).render(), &BOX, "sbdpt_pairs");
+    let scene = beside_a_caustic(Material::glass("glass", 1.5, 0.0), sphere(dvec3(0.0, 0.6, 0.0), 0.4, 16).flat());
+    let job = scene.job().size(64, 32).edges(5);
+    let expected = job.clone().pipeline("pt").samples(256).render();
+    assert_agree(&mortal(job.pipeline("sbdpt").samples(96)).render(), &expected, "beside glass");
+}
+
 /// Light vertices without eye walks leave the mean as it was, whatever the weights and the count of implicit samples.
 #[test]
 fn a_share_of_eye_walks_keeps_the_mean() {

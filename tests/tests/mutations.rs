@@ -201,6 +201,13 @@ static FURNACE_BY_FEW_WALKS: Check = Check::new("sbdpt with a share of its eye w
     constant(stages, small(&furnace(0.8), 4).set("walk_share", 0.3), ("sbdpt", 256), 2.952)
 });
 
+static FURNACE_BY_MORTAL_WALKS: Check =
+    Check::new("sbdpt with walks that end by a chance that weights know of, furnace", |stages| {
+        let scene = furnace(0.8);
+    let job = small(&scene, 4).set("eye_survival", 0.4).set("light_survival", 0.6);
+        constant(stages, job, ("sbdpt", 256), 2.952)
+    });
+
 static FURNACE_BY_PAIRS: Check = Check::new("sbdpt_pairs, furnace", |stages| {
     constant(stages, small(&furnace(0.8), 5), ("sbdpt_pairs", 192), 3.3616)
 });
@@ -653,6 +660,34 @@ fn errors_of_bidirectional_weights() {
             old: "join_samples(s, t) * end.distance_squared",
             new: "1.0 * end.distance_squared",
             check: &FURNACE_BY_FEW_WALKS,
+        },
+        Mutation {
+            name: "walks that go on by chance do not carry the light of those that end",
+            module: "transport/survival",
+            old: "sample.weight /= probability;\n",
+            new: "",
+            check: &FURNACE_BY_MORTAL_WALKS,
+        },
+        Mutation {
+            name: "densities in reverse do not know that walks may end",
+            module: "transport/advance",
+            old: "reverse_survival * reverse_pdf",
+            new: "reverse_pdf",
+            check: &FURNACE_BY_MORTAL_WALKS,
+        },
+        Mutation {
+            name: "connections are weighted as if eye walks always went on",
+            module: "transport/connect",
+            old: "eye_survival * scattered.pdf",
+            new: "scattered.pdf",
+            check: &FURNACE_BY_MORTAL_WALKS,
+        },
+        Mutation {
+            name: "splats are weighted as if eye walks always went on",
+            module: "stage/shade_light_mis",
+            old: "eye_survival * reverse_pdf_bsdf",
+            new: "1.0 * reverse_pdf_bsdf",
+            check: &FURNACE_BY_MORTAL_WALKS,
         },
         Mutation {
             name: "eye walks that two light vertices share are counted for both",

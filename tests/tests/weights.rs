@@ -44,7 +44,7 @@ const ROW_MATERIAL: usize = 64;
 const ROW_EMITTER: usize = 76;
 const ROW_COINCIDENT: usize = 88;
 const ROW_SHARE: usize = 91;
-const ROW_PAIRS: usize = 94;
+const ROW_SURVIVAL: usize = 95;
 /// Materials in `all_materials`, and which of them are lights.
 const MATERIALS: usize = 12;
 const EMITTERS: [usize; 2] = [10, 11];
@@ -104,6 +104,8 @@ const FOLLOWS: &[Edit] = &[
         "import package::transport::implicit::add_implicit;\nimport package::probe::forced_path::eye_event;",
     ),
     ("stage/shade_eye", "sample_bsdf(bsdf, outgoing, random.xyz, RADIANCE)", "eye_event(bsdf, outgoing, s)"),
+    ("transport/survival", "if random >= probability {", "if false {"),
+    ("transport/survival", "random / probability", "0.0"),
     (
         "transport/implicit",
         "import package::film::{splat, splat_implicit};",
@@ -136,8 +138,28 @@ const VARIES: &[Edit] = &[
     ),
     (
         "stage/shade_light_mis",
-        "import package::params::walk_share;",
-        "import package::probe::weight_settings::walk_share;",
+        "import package::params::{eye_survival, walk_share};",
+        "import package::probe::weight_settings::{eye_survival, walk_share};",
+    ),
+    (
+        "stage/shade_eye",
+        "import package::params::light_survival;",
+        "import package::probe::weight_settings::light_survival;",
+    ),
+    (
+        "stage/extend_light",
+        "import package::params::{eye_survival, ",
+        "import package::probe::weight_settings::eye_survival;\nimport package::params::{",
+    ),
+    (
+        "transport/connect",
+        "import package::params::{eye_survival, light_survival};",
+        "import package::probe::weight_settings::{eye_survival, light_survival};",
+    ),
+    (
+        "transport/survival",
+        "import package::params::{eye_survival, light_survival};",
+        "import package::probe::weight_settings::{eye_survival, light_survival};",
     ),
     ("transport/strategy", "import package::tallies::", "import package::probe::weight_settings::"),
 ];
@@ -215,22 +237,22 @@ fn table(rendering: &Rendering) -> Vec<[u64; COLUMNS]> {
 static TABLE: LazyLock<Vec<[u64; COLUMNS]>> = LazyLock::new(|| {
     let scene = all_materials();
     let job = job(&scene).library(probe_library()).pipeline("probe").fixed_point();
-    let job = edited(edited(job, FOLLOWS), VARIES).lens(0.05, 3.0).edges(6).size(64, 24).samples(16);
+    let job = edited(edited(job, FOLLOWS), VARIES).lens(0.05, 3.0).edges(6).size(64, 28).samples(16);
     table(&job.render())
 });
 
 /// Check 8: along paths of one to six edges, through every kind of scattering to every kind of light, the weights of all strategies of a
 /// subset add up to one, times the samples that each takes; for any weights, any way of counting, any share of light vertices that
-/// have eye walks, and eye walks that two of them share. A path that no strategy of the subset makes has none.
+/// have eye walks, eye walks that two of them share, and walks that end by a chance that weights know of. A path that no strategy of the subset makes has none.
 #[test]
 fn weights_of_a_path_sum_to_one() {
     assert_none_is_off(0..ROW_COINCIDENT);
-    assert_none_is_off(ROW_SHARE..ROW_PAIRS + 1);
+    assert_none_is_off(ROW_SHARE..ROW_SURVIVAL + 2);
     let lights = [0, 8, 16, 24, 32].into_iter().zip([1, 2, 2, 2, 1]);
     assert_tested(lights.flat_map(|(row, shortest)| row + shortest..=row + 6));
     assert_tested(ROW_COUNTING..ROW_COUNTING + 9);
     assert_tested(ROW_EARLY_END..ROW_EARLY_END + 2);
-    assert_tested(ROW_SHARE..=ROW_PAIRS);
+    assert_tested(ROW_SHARE..ROW_SURVIVAL + 2);
     assert_tested(ROW_SUBSET..=ROW_NOTHING);
     assert_tested(ROW_DELTAS..ROW_DELTAS + 5);
     assert_tested(ROW_MATERIAL..ROW_MATERIAL + MATERIALS);
@@ -413,6 +435,27 @@ fn a_share_of_eye_walks_takes_its_share_of_rays() {
         // Walks of 3, 2, 1 rays and none, each there or not.
         let error = ((9.0 + 4.0 + 1.0) * share * (1.0 - share) / paths).sqrt();
         assert!((rays - (always + share * others)).abs() <= 4.0 * error, "{share}: {rays} rays of walks a path");
+    }
+}
+
+/// In a white furnace walks end by nothing but the chance that they are given: of eye walks that go on with probability e and light walks
+/// with l the rays are sums of powers of both.
+#[test]
+fn mortal_walks_take_their_share_of_rays() {
+    let scene = furnace(1.0);
+    let k = FURNACE_EDGES as i32;
+    let paths = 16.0 * 16.0 * 64.0;
+    for (eye, light) in [(0.5, 1.0), (1.0, 0.5), (0.7, 0.6)] {
+        let job = job(&scene).pipeline("sbdpt").edges(FURNACE_EDGES).size(16, 16).samples(64).set("counting", "first");
+        let rendering = job.set("eye_survival", eye).set("light_survival", light).render();
+        assert_mean(&rendering, f64::from(k), "survival");
+        let reached = |t: i32| if t == 1 { 1.0 } else { f64::powi(light, t - 2) };
+        let eye_rays = |t: i32| (0..if t == 1 { k } else { k - t }).map(|i| f64::powi(eye, i)).sum::<f64>();
+        let expected: f64 = (1..=k).map(|t| reached(t) * (eye_rays(t) + f64::from(u8::from(t > 1)))).sum();
+        let rays = (rendering.rays - rendering.visibility) as f64 / paths;
+        // A path takes 6 to 15 rays, so that their deviation is 4.5 at most.
+        let error = 4.5 / f64::sqrt(paths);
+        assert!((rays - expected).abs() <= 4.0 * error, "{eye}, {light}: {rays} rays of walks a path, not {expected}");
     }
 }
 

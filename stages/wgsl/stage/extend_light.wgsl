@@ -1,7 +1,7 @@
 import package::real::{real, vec3r, vec4r};
 import package::state::{FLAGS_PARALLEL, Path, Walk};
 import package::outcome::{ABSORBED, SCATTERED};
-import package::params::{max_edges, regularise, regularise_none};
+import package::params::{eye_survival, max_edges, regularise, regularise_none};
 import package::features::{HAS_AREA_LIGHT, HAS_DIRECTIONAL_LIGHT, HAS_POINT_LIGHT, HAS_SKY, HAS_SPOT_LIGHT};
 import package::random::{DIMENSION_SCATTER, WALK_LIGHT, random4};
 import package::surface::surface::surface_on;
@@ -13,7 +13,7 @@ import package::transport::connect::stored_light_vertex;
 import package::transport::dimension::DIMENSION_DIRECTION;
 import package::transport::recursive_mis::{MisPartial, scaled, source};
 import package::transport::strategy::light_joins;
-import package::transport::termination::survives;
+import package::transport::survival::goes_on;
 import package::transport::walk::is_absorbed;
 
 /// Sends the light walk on from y_t, t = `path.light_length`, when the eye walk that belongs to it is over.
@@ -37,10 +37,10 @@ fn extend_light(light: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     let bsdf = bsdf_at(surface, material_at(surface), outgoing);
     let random = random4(WALK_LIGHT, t, DIMENSION_SCATTER);
     var sample = sample_bsdf(bsdf, outgoing, random.xyz, IMPORTANCE);
-    if is_absorbed(sample) || !survives(light, &sample, bsdf, t, random.w, IMPORTANCE) {
+    if is_absorbed(sample) || !goes_on(light, &sample, bsdf, t, random.w, IMPORTANCE) {
         return ABSORBED;
     }
-    advance(light, surface, bsdf, sample, light_sums(light), light_joins(t - 1u));
+    advance(light, surface, bsdf, sample, light_sums(light), light_joins(t - 1u), eye_survival);
     return SCATTERED;
 }
 

@@ -2,6 +2,7 @@ import package::real::{real, vec3r};
 import package::state::{Path, Walk};
 import package::outcome::{ENDED, SCATTERED};
 import package::features::HAS_AREA_LIGHT;
+import package::params::light_survival;
 import package::random::{DIMENSION_SCATTER, WALK_EYE, random4};
 import package::surface::surface::{NO_LIGHT, Surface};
 import package::surface::material::{emission_at, is_emissive, material_at};
@@ -13,7 +14,7 @@ import package::transport::dimension::eye_vertex;
 import package::transport::implicit::add_implicit;
 import package::transport::recursive_mis::{MisPartial, join, scaled};
 import package::transport::strategy::{eye_joins, eye_limit, implicit_counts, is_joined, is_used};
-import package::transport::termination::survives;
+import package::transport::survival::goes_on;
 import package::transport::walk::{arrive, is_absorbed};
 
 /// Vertex x_s of the eye walk that belongs to light vertex y_t: adds emission that it met (path of s edges), joins x_s to y_t
@@ -68,9 +69,9 @@ fn scatter_eye(eye: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sums: Mis
     let outgoing = -eye.direction;
     let random = random4(WALK_EYE, eye_vertex(s, t), DIMENSION_SCATTER);
     var sample = sample_bsdf(bsdf, outgoing, random.xyz, RADIANCE);
-    if is_absorbed(sample) || !survives(eye, &sample, bsdf, s, random.w, RADIANCE) {
+    if is_absorbed(sample) || !goes_on(eye, &sample, bsdf, s, random.w, RADIANCE) {
         return ENDED;
     }
-    advance(eye, surface, bsdf, sample, sums, eye_joins(s - 1u));
+    advance(eye, surface, bsdf, sample, sums, eye_joins(s - 1u), light_survival);
     return SCATTERED;
 }

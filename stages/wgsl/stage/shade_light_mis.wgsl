@@ -1,7 +1,7 @@
 import package::real::{real, vec3r};
 import package::state::{FLAGS_PARALLEL, Path, Walk};
 import package::outcome::{ENDED, SCATTERED, UNJOINED};
-import package::params::walk_share;
+import package::params::{eye_survival, walk_share};
 import package::features::{HAS_DIRECTIONAL_LIGHT, HAS_SKY};
 import package::random::{DIMENSION_CHOICE, WALK_LIGHT, random4};
 import package::surface::surface::Surface;
@@ -54,7 +54,7 @@ fn join_camera(light: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sums: M
     }
     let outgoing = -light.direction;
     let scattered = eval_bsdf(bsdf, outgoing, camera.direction, IMPORTANCE);
-    let reverse_pdf = reverse_pdf_bsdf(bsdf, outgoing, camera.direction);
+    let reverse_pdf = eye_survival * reverse_pdf_bsdf(bsdf, outgoing, camera.direction);
     let rivals = closed_sum(sums, reverse_pdf, light_joins(t - 1u), implicit_term(t));
     let pdf_area = camera.importance * surface_cosine(surface, camera.direction);
     let weight = weight_over(1.0, scaled(pdf_area, rivals));

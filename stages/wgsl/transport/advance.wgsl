@@ -36,15 +36,16 @@ fn meet(walk: ptr<function, Walk>, sums: MisPartial, surface: Surface, parallel:
     return arrived_sums(sums, distance * distance, surface_cosine(surface, walk.direction));
 }
 
-/// Sends the walk on along a sampled direction. `sums` are those at the surface, `ended` as in `scattered_sums`.
-fn advance(walk: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sample: BsdfSample, sums: MisPartial, ended: real) {
+/// Sends the walk on along a sampled direction. `sums` are those at the surface, `ended` as in `scattered_sums`,
+/// `reverse_survival` the probability with which the other kind of walk goes on.
+fn advance(walk: ptr<function, Walk>, surface: Surface, bsdf: Bsdf, sample: BsdfSample, sums: MisPartial, ended: real, reverse_survival: real) {
     let reverse_pdf = reverse_pdf_of_sample(bsdf, -walk.direction, sample);
     let cosine = surface_cosine(surface, sample.direction);
     var next: MisPartial;
     if HAS_DELTA && sample.delta {
         next = specular_sums(sums, sample.pdf, reverse_pdf, cosine);
     } else {
-        next = scattered_sums(sums, sample.pdf, reverse_pdf, cosine, ended);
+        next = scattered_sums(sums, sample.pdf, reverse_survival * reverse_pdf, cosine, ended);
     }
     set_sums(walk, next);
     depart(walk, surface, sample);

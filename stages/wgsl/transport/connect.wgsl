@@ -2,6 +2,7 @@
 
 import package::real::{real, vec3r};
 import package::state::{Path, Walk};
+import package::params::{eye_survival, light_survival};
 import package::features::{HAS_AREA_LIGHT, HAS_SKY};
 import package::surface::surface::{Surface, surface_on};
 import package::surface::material::material_at;
@@ -42,9 +43,10 @@ fn connect(eye: ptr<function, Walk>, light: ptr<function, Walk>, surface: Surfac
     let end = side.end;
     let outgoing = -eye.direction;
     let scattered = eval_bsdf(bsdf, outgoing, end.direction, RADIANCE);
-    let eye_sum = closed_sum(sums, reverse_pdf_bsdf(bsdf, outgoing, end.direction), eye_joins(s - 1u), 0.0);
+    let reverse_pdf = light_survival * reverse_pdf_bsdf(bsdf, outgoing, end.direction);
+    let eye_sum = closed_sum(sums, reverse_pdf, eye_joins(s - 1u), 0.0);
     let eye_side = scaled(end.pdf * surface_cosine(surface, end.direction), eye_sum);
-    let light_side = scaled(scattered.pdf * end.cosine, side.sum);
+    let light_side = scaled(eye_survival * scattered.pdf * end.cosine, side.sum);
     let transported = eye.throughput * scattered.value * light.throughput * end.value;
     let own = join_samples(s, t) * end.distance_squared;
     let weight = weight_over(own, join(eye_side, light_side));
@@ -75,9 +77,9 @@ fn scattering_side(light: ptr<function, Walk>, surface: Surface, s: u32, t: u32)
     if is_connectable(bsdf) {
         let scattered = eval_bsdf(bsdf, outgoing, -side.end.direction, IMPORTANCE);
         side.end.value = scattered.value;
-        side.end.pdf = scattered.pdf;
+        side.end.pdf = light_survival * scattered.pdf;
         side.end.segment = segment_between(surface, vertex);
-        let reverse_pdf = reverse_pdf_bsdf(bsdf, outgoing, -side.end.direction);
+        let reverse_pdf = eye_survival * reverse_pdf_bsdf(bsdf, outgoing, -side.end.direction);
         side.sum = closed_sum(light_sums(light), reverse_pdf, light_joins(t - 1u), implicit_term(s + t));
     }
     return side;

@@ -26,6 +26,9 @@ struct Arguments {
     /// These references alone
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
+    /// A parameter of the pipeline, or several
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parameter)]
+    parameters: Vec<(String, String)>,
     /// With the conventions of the other renderer
     #[arg(long)]
     following: bool,
@@ -79,7 +82,8 @@ fn print_table(arguments: &Arguments, title: &str, list: &[Reference]) {
         return;
     }
     let following = if arguments.following { ", following" } else { "" };
-    println!("\n`{}`{following}, {} s a scene; {title}\n", arguments.pipeline, arguments.seconds);
+    let parameters: String = arguments.parameters.iter().map(|(key, value)| format!(", {key}={value}")).collect();
+    println!("\n`{}`{parameters}{following}, {} s a scene; {title}\n", arguments.pipeline, arguments.seconds);
     println!(
         "| scene, `max_edges` | samples a pixel | mean ours / reference (R, G, B) | scores | beyond 4 | beyond 6 | largest | root mean square |"
     );
@@ -104,7 +108,14 @@ fn print_row(arguments: &Arguments, reference: &Reference) {
     }
 }
 
+/// Key and value of a parameter.
+fn parameter(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("a parameter is KEY=VALUE")?;
+    Ok((key.to_owned(), value.to_owned()))
+}
+
 fn render(arguments: &Arguments, job: Job) -> Rendering {
+    let job = arguments.parameters.iter().fold(job, |job, (key, value)| job.set(key, value));
     job.pipeline(&arguments.pipeline).suited().render_for(arguments.seconds)
 }
 

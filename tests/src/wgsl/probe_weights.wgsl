@@ -33,7 +33,7 @@ import package::stage::shade_light_mis::shade_light_mis;
 import package::stage::shade_eye::shade_eye;
 import package::stage::escape_eye::escape_eye;
 import package::probe::forced_path::{MOST_VERTICES, ends_at_infinity, force_hit, forced, forced_direction, forced_edges, forced_light, reported_hit, reported_join};
-import package::probe::weight_settings::{counting, draw_settings, early_end, light_vertices_rate, mis, subset, walk_share, walk_vertices};
+import package::probe::weight_settings::{counting, draw_settings, early_end, light_vertices_rate, mis, mortal, subset, walk_share, walk_vertices};
 
 const COLUMNS: u32 = 16u;
 /// Eight rows for each kind of light, by edges.
@@ -61,6 +61,8 @@ const ROW_COINCIDENT: u32 = 88u;
 const ROW_SHARE: u32 = 91u;
 /// Two light vertices share an eye walk.
 const ROW_PAIRS: u32 = 94u;
+/// Walks go on as long as they can; they may end by chance.
+const ROW_SURVIVAL: u32 = 95u;
 
 /// Tries for finding a delta lobe from the other side.
 const TRIES: u32 = 64u;
@@ -213,7 +215,7 @@ fn joins_light(drawn: Drawn, s: u32) -> bool {
 fn test_path() {
     let k = forced_edges;
     let key = 32u * k;
-    draw_settings(k, random4(WALK_EYE, key, 16u), random4(WALK_EYE, key, 17u), random4(WALK_EYE, key, 18u));
+    draw_settings(k, random4(WALK_EYE, key, 16u), random4(WALK_EYE, key, 17u), random4(WALK_EYE, key, 18u), random4(WALK_EYE, key, 19u));
     var makers = 0u;
     for (var s = 0u; s <= k; s += 1u) {
         makers += select(0u, 1u, makes_path(s, k - s));
@@ -226,6 +228,7 @@ fn test_path() {
     if walk_vertices == 2u {
         count(ROW_PAIRS, off);
     }
+    count(ROW_SURVIVAL + select(0u, 1u, mortal), off);
     count(ROW_SUBSET + subset, off);
     if makers == 0u {
         count(ROW_NOTHING, off);

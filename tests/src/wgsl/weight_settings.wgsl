@@ -8,6 +8,10 @@ var<private> counting: u32;
 var<private> early_end: bool;
 var<private> walk_share: real;
 var<private> walk_vertices: u32 = 1u;
+var<private> eye_survival: real;
+var<private> light_survival: real;
+/// Whether walks may end by these two.
+var<private> mortal: bool;
 var<private> use_implicit: bool;
 var<private> use_explicit: bool;
 var<private> use_particle: bool;
@@ -33,8 +37,8 @@ fn light_vertices_rate_sum(t: u32) -> real {
     return sum;
 }
 
-/// Settings for a path of `edges` edges: of weights and counting, and of the subset.
-fn draw_settings(edges: u32, a: vec4r, b: vec4r, c: vec4r) {
+/// Settings for a path of `edges` edges: of weights and counting, of the subset, and of the ends of walks.
+fn draw_settings(edges: u32, a: vec4r, b: vec4r, c: vec4r, d: vec4r) {
     mis = u32(a.x * 3.0);
     counting = u32(a.y * 3.0);
     early_end = a.z < 0.5;
@@ -46,6 +50,9 @@ fn draw_settings(edges: u32, a: vec4r, b: vec4r, c: vec4r) {
         walk_vertices = 2u;
     }
     survival = min(0.05 + 1.2 * a.w, 1.0);
+    mortal = d.x < 0.5;
+    eye_survival = select(1.0, 0.1 + 0.9 * d.y, mortal);
+    light_survival = select(1.0, 0.1 + 0.9 * d.z, mortal);
     subset = u32(c.x * 3.0);
     let all = subset == 0u;
     use_implicit = all || b.x < 0.75;
