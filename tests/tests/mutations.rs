@@ -204,7 +204,7 @@ static FURNACE_BY_FEW_WALKS: Check = Check::new("sbdpt with a share of its eye w
 static FURNACE_BY_MORTAL_WALKS: Check =
     Check::new("sbdpt with walks that end by a chance that weights know of, furnace", |stages| {
         let scene = furnace(0.8);
-    let job = small(&scene, 4).set("eye_survival", 0.4).set("light_survival", 0.6);
+        let job = small(&scene, 4).set("eye_survival", 0.4).set("light_survival", 0.6);
         constant(stages, job, ("sbdpt", 256), 2.952)
     });
 
