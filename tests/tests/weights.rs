@@ -243,7 +243,8 @@ static TABLE: LazyLock<Vec<[u64; COLUMNS]>> = LazyLock::new(|| {
 
 /// Check 8: along paths of one to six edges, through every kind of scattering to every kind of light, the weights of all strategies of a
 /// subset add up to one, times the samples that each takes; for any weights, any way of counting, any share of light vertices that
-/// have eye walks, eye walks that two of them share, and walks that end by a chance that weights know of. A path that no strategy of the subset makes has none.
+/// have eye walks, eye walks that two of them share, and walks that end by a chance that weights know of. A path that no strategy of the
+/// subset makes has none.
 #[test]
 fn weights_of_a_path_sum_to_one() {
     assert_none_is_off(0..ROW_COINCIDENT);

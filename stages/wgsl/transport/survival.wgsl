@@ -1,5 +1,5 @@
-//! Ending walks with a probability that their densities know of (Veach 1997, section 10.2.3.3): it is a factor of the density with which
-//! a walk scatters, forwards and in reverse, so that strategies count as often as they are tried.
+//! Ending walks with a probability that their densities know of (Veach 1997, chapter 10): it is a factor of the density with which a walk
+//! scatters, forwards and in reverse, so that strategies count as often as they are tried.
 
 import package::real::real;
 import package::params::{eye_survival, light_survival};
