@@ -23,6 +23,12 @@ pub struct Plan {
     pub counters: Vec<Counter>,
     /// Where the control buffer says how many entries the kernel of each queue takes.
     pub entries: EntryWords,
+    /// Bytes that joining a queue takes, an entry or a record, one for each triple of the arguments buffer.
+    pub pushed_bytes: Vec<u32>,
+    /// The triple of the stage that a loop begins with whose paths stand side by side, if there is one: what joins it has moved the
+    /// kernel's `moved_bytes`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dense: Option<u32>,
     /// Tallies, where kernels use one: each has its own part of the buffers of `Role::TallyCounts` and `Role::TallyRates`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tallies: Vec<Tally>,
@@ -56,8 +62,8 @@ pub struct Needs {
 }
 
 /// Words of the control buffer, one for each triple of the arguments buffer: from when the kernels before an indirect dispatch are done
-/// until it is, the word holds how many paths, or records of a stream, it takes.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+/// until it is, the word holds how many paths, or records of a stream, it takes. The word before it holds how many wait.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct EntryWords {
     /// That of triple 0.
     pub first: u32,
@@ -69,6 +75,11 @@ impl EntryWords {
     /// The word of a triple.
     pub fn of_slot(self, slot: u32) -> u32 {
         self.first + self.stride * slot
+    }
+
+    /// The word that says how many wait for a triple's dispatch.
+    pub fn waiting(self, slot: u32) -> u32 {
+        self.of_slot(slot) - 1
     }
 }
 
@@ -183,6 +194,11 @@ pub struct Kernel {
     pub load_bytes: u32,
     /// Bytes of path state that a path stores.
     pub store_bytes: u32,
+    /// Bytes of state that it stores of a path which goes on with the first stage of a loop whose paths stand side by side: see
+    /// `Plan::dense`.
+    pub moved_bytes: u32,
+    /// Bytes that it moves to find a path: the entry of its queue, the path's slot and number; of a stream's consumer, the record.
+    pub entry_bytes: u32,
     /// What its rays are counted as; none where it has several stages, which count by themselves.
     pub rays: Option<RayKind>,
 }

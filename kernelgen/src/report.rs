@@ -89,6 +89,8 @@ pub struct KernelReport {
     pub load_bytes: u32,
     /// Bytes of state that a path stores.
     pub store_bytes: u32,
+    /// Bytes of state that it stores of a path which goes on in a loop whose paths stand side by side.
+    pub moved_bytes: u32,
     /// Leaves it loads.
     pub loads: Vec<String>,
     /// Leaves it stores.
@@ -236,6 +238,7 @@ fn kernels(findings: &Findings<'_>) -> Vec<KernelReport> {
             stages: kernel.stages.clone(),
             load_bytes: kernel.load_bytes,
             store_bytes: kernel.store_bytes,
+            moved_bytes: kernel.moved_bytes,
             loads: traffic.iter().flat_map(|traffic| names(&traffic.loads)).collect(),
             stores: traffic.iter().flat_map(|traffic| names(&traffic.stores)).collect(),
         }
@@ -374,15 +377,20 @@ impl Report {
     }
 
     fn kernel_rows(&self) -> Vec<Vec<String>> {
-        let mut rows = vec![["kernel", "loads B", "stores B"].map(str::to_owned).to_vec()];
+        let moves = self.kernels.iter().any(|kernel| kernel.moved_bytes > 0);
+        let columns = if moves { 4 } else { 3 };
+        let row = |cells: [String; 4]| cells.into_iter().take(columns).collect::<Vec<String>>();
+        let mut rows = vec![row(["kernel", "loads B", "stores B", "moves on B"].map(str::to_owned))];
         let stages = self.kernels.iter().filter(|kernel| !kernel.stages.is_empty());
         let name = |kernel: &KernelReport| match kernel.stages.get(1..) {
             Some(others @ [_, ..]) => format!("{} with {}", kernel.name, others.join(", ")),
             _ => kernel.name.clone(),
         };
-        rows.extend(
-            stages.map(|kernel| vec![name(kernel), kernel.load_bytes.to_string(), kernel.store_bytes.to_string()]),
-        );
+        rows.extend(stages.map(|kernel| {
+            let bytes = [kernel.load_bytes, kernel.store_bytes, kernel.moved_bytes].map(|bytes| bytes.to_string());
+            let [loads, stores, moved] = bytes;
+            row([name(kernel), loads, stores, moved])
+        }));
         rows
     }
 

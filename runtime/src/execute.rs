@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::profile::{Measured, Profile, Queries};
 use crate::program::{Command, Extent, commands};
 use bytemuck::{Pod, Zeroable};
-use kernelgen::plan::{Access, Counter, Kernel, OVERRIDES, Plan, Role};
+use kernelgen::plan::{Access, Counter, EntryWords, Kernel, OVERRIDES, Plan, Role};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -73,6 +73,8 @@ pub struct Executor {
     pass: wgpu::Buffer,
     control: wgpu::Buffer,
     counters: Vec<Counter>,
+    entries: EntryWords,
+    queues: usize,
     counted: std::ops::Range<u64>,
     spare: Vec<wgpu::Buffer>,
     flying: VecDeque<Flight>,
@@ -113,6 +115,8 @@ impl Executor {
             pass: buffers.of(plan, Role::Pass)?.clone(),
             control: buffers.of(plan, Role::Control)?.clone(),
             counters: plan.counters.clone(),
+            entries: plan.entries,
+            queues: plan.pushed_bytes.len(),
             counted,
             spare: Vec::new(),
             flying: VecDeque::new(),

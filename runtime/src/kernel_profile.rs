@@ -1,4 +1,4 @@
-//! What each kernel of a render costs: time, paths, bytes of state as the generator predicts them, size.
+//! What each kernel of a render costs: time, paths, bytes moved as the generator predicts them, size.
 
 use crate::error::Error;
 use crate::occupancy::Occupancy;
@@ -33,6 +33,11 @@ pub struct KernelMeasurements {
     pub load_bytes: u32,
     /// Bytes of state that a path stores, as the generator predicts.
     pub store_bytes: u32,
+    /// Bytes of state that it moves for a sample, as the generator predicts: those of the paths that it takes, and of those that go on
+    /// to another place.
+    pub state_bytes_per_sample: f64,
+    /// Bytes that it moves for a sample to find paths and to send them on: entries of queues, and records of streams.
+    pub queue_bytes_per_sample: f64,
     /// Device time of a million samples, ms; unknown where the adapter has no timestamps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ms_per_msample: Option<f64>,
@@ -46,9 +51,9 @@ pub struct KernelMeasurements {
 }
 
 impl KernelMeasurements {
-    /// Bytes of state that it moves for a sample, as the generator predicts.
+    /// All bytes that it moves for a sample. What stages look up in the scene and add to the film is not among them.
     pub fn bytes_per_sample(&self) -> f64 {
-        self.entries_per_sample * f64::from(self.load_bytes + self.store_bytes)
+        self.state_bytes_per_sample + self.queue_bytes_per_sample
     }
 }
 
@@ -61,7 +66,8 @@ impl KernelProfile {
         let times = rendered.profile.ns_per_slot();
         let measured = |(index, kernel): (usize, &Kernel)| {
             let time = times.as_ref().map(|times| times[index]);
-            measure(kernel, occupancy.per_slot(index), time, rendered.compiled.by_kernel[index])
+            let bytes = bytes(plan, index, occupancy);
+            measure(kernel, occupancy.per_slot(index), bytes, time, rendered.compiled.by_kernel[index])
         };
         let working = |(index, _): &(usize, &Kernel)| !occupancy.entries[*index].is_empty();
         let rounds = |(index, kernel): (usize, &Kernel)| (kernel.name.clone(), occupancy.by_round(index));
@@ -73,7 +79,7 @@ impl KernelProfile {
         })
     }
 
-    /// Bytes of state that all kernels move for a sample, as the generator predicts.
+    /// Bytes that all kernels move for a sample, as the generator predicts.
     pub fn bytes_per_sample(&self) -> f64 {
         self.kernels.iter().map(KernelMeasurements::bytes_per_sample).sum()
     }
@@ -94,10 +100,21 @@ impl KernelProfile {
     }
 }
 
+/// Bytes of state that a kernel moves for a sample, and those of queues and streams.
+fn bytes(plan: &Plan, index: usize, occupancy: &Occupancy) -> [f64; 2] {
+    let (kernel, entries) = (&plan.kernels[index], occupancy.per_slot(index));
+    let pushes = |queue: usize| occupancy.pushes_per_slot(index, queue);
+    let moved = plan.dense.map_or(0.0, |queue| pushes(queue as usize) * f64::from(kernel.moved_bytes));
+    let pushed = plan.pushed_bytes.iter().enumerate().map(|(queue, &bytes)| pushes(queue) * f64::from(bytes));
+    let state = entries * f64::from(kernel.load_bytes + kernel.store_bytes) + moved;
+    [state, entries * f64::from(kernel.entry_bytes) + pushed.sum::<f64>()]
+}
+
 /// `time` in ns a sample, which is ms a million samples.
 fn measure(
     kernel: &Kernel,
     entries: f64,
+    [state_bytes_per_sample, queue_bytes_per_sample]: [f64; 2],
     time: Option<f64>,
     compile_seconds: f64,
 ) -> Result<KernelMeasurements, Error> {
@@ -106,6 +123,8 @@ fn measure(
         entries_per_sample: entries,
         load_bytes: kernel.load_bytes,
         store_bytes: kernel.store_bytes,
+        state_bytes_per_sample,
+        queue_bytes_per_sample,
         ms_per_msample: time,
         gb_per_s: None,
         compile_seconds,

@@ -1,6 +1,7 @@
-//! How full queues are: the paths that each kernel takes, round by round.
+//! How full queues are: the paths that each kernel takes, round by round, and those that it sends on.
 
 use crate::program::{Command, Entries};
+use kernelgen::plan::EntryWords;
 
 /// What kernels took in passes that ran for this alone.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -13,22 +14,32 @@ pub struct Occupancy {
     /// behind the rounds follows the last of them. Empty for housekeeping that is
     /// not sized by what waits.
     pub entries: Vec<Vec<u64>>,
+    /// By kernel of the plan, by queue: paths, or records, that joined it from there.
+    pub pushes: Vec<Vec<u64>>,
+    /// Where the control buffer says how many wait.
+    words: EntryWords,
 }
 
 impl Occupancy {
-    /// Nothing counted yet, for a plan of so many kernels.
-    pub fn new(kernels: usize) -> Self {
-        Self { entries: vec![Vec::new(); kernels], ..Self::default() }
+    /// Nothing counted yet, for a plan of so many kernels and queues.
+    pub fn new(kernels: usize, queues: usize, words: EntryWords) -> Self {
+        let pushes = vec![vec![0; queues]; kernels];
+        Self { entries: vec![Vec::new(); kernels], pushes, words, ..Self::default() }
     }
 
-    /// Adds a pass of `active` slots: what the control buffer said before each dispatch that is sized by it.
-    pub fn add(&mut self, program: &[Command], counted: &[u32], active: u32) {
-        for (command, &counted) in program.iter().zip(counted) {
+    /// Adds a pass of `active` slots: the control buffer before each dispatch, and behind the last.
+    pub fn add(&mut self, program: &[Command], states: &[&[u32]], active: u32) {
+        for (command, states) in program.iter().zip(states.windows(2)) {
+            let [before, after] = [states[0], states[1]];
             let taken = match command.entries {
-                Entries::None => 0,
+                Entries::None => continue,
                 Entries::Active => active,
-                Entries::Counted(_) => counted,
+                Entries::Counted(word) => before[word],
             };
+            for (slot, pushes) in (0..).zip(&mut self.pushes[command.kernel]) {
+                let waiting = self.words.waiting(slot) as usize;
+                *pushes += u64::from(after[waiting].saturating_sub(before[waiting]));
+            }
             if taken > 0 {
                 let rounds = &mut self.entries[command.kernel];
                 let round = command.round as usize;
@@ -45,6 +56,11 @@ impl Occupancy {
         self.entries[kernel].iter().sum::<u64>() as f64 / self.slots.max(1) as f64
     }
 
+    /// What joined a queue from a kernel in all rounds, for one slot in use.
+    pub fn pushes_per_slot(&self, kernel: usize, queue: usize) -> f64 {
+        self.pushes[kernel][queue] as f64 / self.slots.max(1) as f64
+    }
+
     /// Entries of a kernel by round, for one slot in use.
     pub fn by_round(&self, kernel: usize) -> Vec<f64> {
         self.entries[kernel].iter().map(|&entries| entries as f64 / self.slots.max(1) as f64).collect()
@@ -57,21 +73,24 @@ mod tests {
     use crate::program::Extent;
 
     #[test]
-    fn entries_are_added_by_kernel_and_round() {
+    fn entries_and_pushes_are_added_by_kernel_and_round() {
         let command = |kernel, round, entries| Command { kernel, round, extent: Extent::Active(64), entries };
         let program = [
             command(0, 0, Entries::None),
             command(1, 0, Entries::Active),
-            command(2, 0, Entries::Counted(36)),
-            command(2, 1, Entries::Counted(36)),
-            command(2, 2, Entries::Counted(36)),
+            command(2, 0, Entries::Counted(1)),
+            command(2, 1, Entries::Counted(1)),
+            command(2, 2, Entries::Counted(1)),
         ];
-        let mut occupancy = Occupancy::new(3);
-        occupancy.add(&program, &[0, 0, 8, 4, 0], 8);
-        occupancy.add(&program, &[0, 0, 2, 0, 0], 2);
+        // How many wait in the only queue, and how many its kernel takes.
+        let mut occupancy = Occupancy::new(3, 1, EntryWords { first: 1, stride: 2 });
+        occupancy.add(&program, &[&[0, 0], &[0, 0], &[0, 8], &[4, 4], &[7, 0], &[7, 0]], 8);
+        occupancy.add(&program, &[&[0, 0], &[0, 0], &[2, 2], &[2, 0], &[2, 0], &[2, 0]], 2);
         assert_eq!((occupancy.slots, occupancy.passes), (10, 2));
         assert_eq!(occupancy.entries, [vec![], vec![10], vec![10, 4]]);
+        assert_eq!(occupancy.pushes, [[0], [2], [7]]);
         assert_eq!(occupancy.per_slot(2), 1.4);
+        assert_eq!(occupancy.pushes_per_slot(2, 0), 0.7);
         assert_eq!(occupancy.by_round(2), [1.0, 0.4]);
     }
 }

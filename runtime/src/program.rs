@@ -20,8 +20,8 @@ pub enum Entries {
     None,
     /// All slots in use.
     Active,
-    /// As the control buffer says at this offset, bytes.
-    Counted(u64),
+    /// As this word of the control buffer says.
+    Counted(usize),
 }
 
 /// A dispatch of the flattened program.
@@ -63,7 +63,7 @@ impl Flattened<'_> {
                 }
                 Step::Single { kernel } => self.push(turn, *kernel, Extent::Single, Entries::None),
                 Step::Indirect { kernel, slot } => {
-                    let counted = Entries::Counted(u64::from(self.plan.entries.of_slot(*slot)) * 4);
+                    let counted = Entries::Counted(self.plan.entries.of_slot(*slot) as usize);
                     self.push(turn, *kernel, Extent::Indirect(u64::from(*slot) * 12), counted);
                 }
                 Step::Loop { turns, body } => self.repeat(turns, body, turn.unwrap_or(0)),

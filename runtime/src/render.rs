@@ -493,7 +493,7 @@ impl Session {
         let work = self.pixels() * natural.min(self.samples.max(1).into());
         let passes = work.div_ceil(self.pass_limit.into());
         let counted = passes.min(COUNTED_PASSES);
-        let mut occupancy = Occupancy::new(self.executor.compiled.by_kernel.len());
+        let mut occupancy = self.executor.nothing_counted();
         for index in 0..counted {
             let done = index * passes / counted * u64::from(self.pass_limit);
             let active = u64::from(self.pass_limit).min(work - done) as u32;

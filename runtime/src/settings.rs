@@ -189,7 +189,7 @@ impl Target {
     /// The shipped layout and schedule to use where none is chosen.
     fn layout_and_schedule(self) -> (&'static str, &'static str) {
         match self {
-            Self::Gpu => ("compact", "ordered"),
+            Self::Gpu => ("split_compact", "ordered"),
             Self::Cpu => ("aos", "wavefront"),
         }
     }
@@ -406,7 +406,7 @@ mod tests {
         let filled = |target| RenderFile::default().with_defaults(target);
         let axes = |settings: RenderFile| (settings.pipeline, settings.layout, settings.schedule, settings.precision);
         let words = |words: [&str; 4]| words.map(|word| Some(word.to_owned())).into();
-        assert_eq!(axes(filled(Target::Gpu)), words(["sbdpt", "compact", "ordered", "f32"]));
+        assert_eq!(axes(filled(Target::Gpu)), words(["sbdpt", "split_compact", "ordered", "f32"]));
         assert_eq!(axes(filled(Target::Cpu)), words(["sbdpt", "aos", "wavefront", "f32"]));
         let chosen = RenderFile { layout: Some("soa".to_owned()), ..RenderFile::default() };
         assert_eq!(chosen.with_defaults(Target::Gpu).layout.as_deref(), Some("soa"));

@@ -50,7 +50,7 @@ fn every_order_of_queues_gives_the_same_bits() {
         assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
         let arrival = [("workgroup", "arrival")];
         let kinds = ["workgroup", "subgroup", "atomic"];
-        let sorted = kinds.into_iter().flat_map(|queue| [(queue, "slot"), (queue, "packed")]);
+        let sorted = kinds.into_iter().flat_map(|queue| [(queue, "slot"), (queue, "packed"), (queue, "dense")]);
         for (queue, order) in arrival.into_iter().chain(sorted) {
             let rendering = job(pipeline).set("schedule.queue", queue).set("schedule.order", order).render();
             assert_same(&rendering, &expected, &format!("{pipeline}, {queue}, {order}"));

@@ -413,6 +413,8 @@ pub enum PathOrder {
     Slot,
     /// As `Slot`, and where all paths meet behind an inner loop they move into slots side by side, with their state.
     Packed,
+    /// As `Packed`, and in a loop paths move with their state to where they stand in the queue of its first stage.
+    Dense,
 }
 
 /// How the film adds.

@@ -50,7 +50,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
     let workgroup = workgroup.and_then(|item| workgroup_size(&item, findings));
     let accumulate = word(&section, "accumulate", &["atomic_f32", "fixed_i64", "racy"], findings);
     let load = section.get("load").and_then(|item| item.word(&["entry", "use"], findings));
-    let order = section.get("order").and_then(|item| item.word(&["arrival", "slot", "packed"], findings));
+    let order = section.get("order").and_then(|item| item.word(&["arrival", "slot", "packed", "dense"], findings));
     let loops = section.get("loops").and_then(|item| item.word(&["nested", "flat"], findings));
     let sort = section.get("sort").and_then(|item| keys(&item, findings));
     let regenerate = match section.get("regenerate") {
@@ -68,7 +68,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Opti
         doc: file.doc.clone(),
         fuse: fuse?,
         queue: [QueueKind::Atomic, QueueKind::Subgroup, QueueKind::Workgroup, QueueKind::None][queue?],
-        order: [PathOrder::Arrival, PathOrder::Slot, PathOrder::Packed][order.unwrap_or_default()],
+        order: [PathOrder::Arrival, PathOrder::Slot, PathOrder::Packed, PathOrder::Dense][order.unwrap_or_default()],
         sort: sort.unwrap_or_default(),
         loops: [Loops::Nested, Loops::Flat][loops.unwrap_or_default()],
         workgroup: workgroup?,

@@ -71,9 +71,16 @@ impl Fusion {
 
     /// Whether a path may need another round: a kernel of the loop leads to one that the round has run by then.
     pub(super) fn is_repeated(&self) -> bool {
-        let place = |entry: &str| self.queued.get_index_of(entry);
-        let back = |chain: &Chain| chain.feeds.iter().any(|fed| place(fed) <= place(&chain.entry));
-        self.queued.values().any(back)
+        self.first_led_back_to() < self.queued.len()
+    }
+
+    /// The first of the kernels that others lead back to which the round has run by then; behind the last, if there is none.
+    pub(super) fn first_led_back_to(&self) -> usize {
+        let back = |(place, chain): (usize, &Chain)| {
+            let places = chain.feeds.iter().filter_map(|fed| self.queued.get_index_of(fed));
+            places.filter(|fed| *fed <= place).min()
+        };
+        self.queued.values().enumerate().filter_map(back).min().unwrap_or(self.queued.len())
     }
 
     /// The stages of each kernel, by entry, in the order of these names.

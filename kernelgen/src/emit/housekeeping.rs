@@ -46,6 +46,8 @@ pub(super) enum Entries {
         ordered: bool,
         /// Whether its kernel gives them slots side by side.
         packed: bool,
+        /// Whether a turn of paths that stand side by side begins with it.
+        turns: bool,
     },
     /// All records that wait in a stream.
     Stream(String),
@@ -83,6 +85,10 @@ impl Prepared {
         if let Entries::Stage { stage, ordered: true, .. } = &self.entries {
             imports.add("queue", ["open_order"]);
             let _ = writeln!(text, "    open_order({});", stage_constant(stage));
+        }
+        if let Entries::Stage { turns: true, .. } = &self.entries {
+            imports.add("queue", ["turn_walk_places"]);
+            text.push_str("    turn_walk_places();\n");
         }
         text
     }

@@ -1,5 +1,6 @@
 //! Kernels of stages and of stream consumers, as text.
 
+use super::dense::Dense;
 use super::memory::Access;
 use super::queue::Queues;
 use super::stream;
@@ -80,10 +81,11 @@ pub(super) fn stage_kernel(frame: Frame<'_>, stage: &WiredStage) -> String {
 impl Frame<'_> {
     /// The whole text.
     pub(super) fn fill(self, filling: Filling) -> String {
-        let Frame { kernel, queues, access, packs, next, gathered, .. } = self;
+        let Frame { kernel, queues, access, packs, next, .. } = self;
+        let moves = self.moves(&filling.targets);
         let Filling { mut imports, heading, locals, instances, body, targets, end, counts } = filling;
         let workgroup = queues.workgroup;
-        let (condition, path) = self.path(&mut imports);
+        let (condition, found) = self.path(&mut imports);
         for buffer in &access.buffers {
             imports.add("tables", [buffer.as_str(), format!("{buffer}_address").as_str()]);
         }
@@ -92,7 +94,7 @@ impl Frame<'_> {
         }
         let (mut test, mut condition, mut targets) = (String::new(), condition, targets);
         let mut taken = String::new();
-        if packs || next.is_some() {
+        if packs || moves || next.is_some() {
             test = format!("    let begun = {condition};\n");
             condition = "begun".to_owned();
         }
@@ -100,12 +102,13 @@ impl Frame<'_> {
             taken = take_next(&targets, &mut imports);
             targets.push((start.to_owned(), "again".to_owned()));
         }
-        let enqueue = taken + &leave(&targets, gathered, queues, &mut imports);
+        let enqueue = taken + &self.leave(&targets, &mut imports);
         let declared = declared(&instances, &mut imports);
         let loaded = loaded(access, &mut imports);
-        let mut stored = String::new();
-        for (number, store) in access.stores.iter().enumerate() {
-            let _ = writeln!(stored, "{}        {store}", if number == 0 { "\n" } else { "" });
+        let stored = lines(&access.stores);
+        let mut hoisted = declared.clone();
+        for local in &access.locals {
+            let _ = writeln!(hoisted, "    {local}");
         }
         let mut numbered = "";
         if queues.numbers_paths() && self.source == Source::Slots {
@@ -114,13 +117,13 @@ impl Frame<'_> {
         }
         let counted = add_tallies(counts, &mut imports);
         let blocks = if packs {
-            self.moved(&path, &declared, &loaded, &body, &stored, &mut imports)
+            self.packed(&hoisted, &found, &loaded, &body, &stored, &mut imports)
+        } else if moves {
+            format!("{hoisted}    if begun {{\n{found}{numbered}{loaded}\n{body}{stored}    }}\n")
         } else {
             let declared = indented(&declared);
             let gap = if declared.is_empty() { "" } else { "\n" };
-            format!(
-                "    if {condition} {{\n        path_id = {path};\n{numbered}{gap}{declared}{loaded}\n{body}{stored}    }}\n"
-            )
+            format!("    if {condition} {{\n{found}{numbered}{gap}{declared}{loaded}\n{body}{stored}    }}\n")
         };
         format!(
             "{imports}\n\
@@ -135,10 +138,10 @@ impl Frame<'_> {
 
     /// Loads and the body, then stores in the slot in which the path goes on. In between all of the workgroup wait for one another: a
     /// path may take the slot of a neighbour.
-    fn moved(
+    fn packed(
         self,
-        path: &str,
-        declared: &str,
+        hoisted: &str,
+        found: &str,
         loaded: &str,
         body: &str,
         stored: &str,
@@ -147,47 +150,156 @@ impl Frame<'_> {
         let constant = stage_constant(self.entry);
         imports.add("pass", ["path_numbers"]);
         imports.add("queue", ["packed_slot"]);
-        let mut locals = String::new();
-        for local in &self.access.locals {
-            let _ = writeln!(locals, "    {local}");
-        }
+        let found_again = self.found(&format!("packed_slot({constant}, index, lane)"), imports);
         format!(
-            "{declared}{locals}    \
+            "{hoisted}    \
                  var carried_number = 0u;\n    \
-                 if begun {{\n        \
-                     path_id = {path};\n        \
+                 if begun {{\n\
+             {found}        \
                      carried_number = path_numbers[path_id];\n\
              {loaded}\n{body}    }}\n\n    \
                  storageBarrier();\n    \
-                 if begun {{\n        \
-                     path_id = packed_slot({constant}, index, lane);\n        \
+                 if begun {{\n\
+             {found_again}        \
                      path_numbers[path_id] = carried_number;\n\
              {stored}    }}\n"
         )
     }
 
-    /// The condition on which there is a path, and its slot.
-    fn path(self, imports: &mut Imports) -> (String, String) {
+    /// The loop whose paths stand side by side, if this kernel is one of it.
+    fn inside(&self) -> Option<&Dense> {
+        let dense = self.queues.dense.as_ref()?;
+        (self.source == Source::Queue && dense.inside.contains(self.entry)).then_some(dense)
+    }
+
+    /// Whether paths of this kernel move to where they stand in a queue.
+    fn moves(&self, targets: &[(String, String)]) -> bool {
+        targets.iter().any(|(target, _)| self.queues.is_first_of_dense(target))
+    }
+
+    /// Where a queue has this path: its place in a loop whose paths stand side by side, else its slot.
+    pub(super) fn queued_as(&self, imports: &mut Imports) -> &'static str {
+        let name = if self.inside().is_some() { "walk_place" } else { "path_id" };
+        imports.add("pass", [name]);
+        name
+    }
+
+    /// The line that names the slot of the path of an invocation outside of such a loop, and a second where tables of the loop are used
+    /// by slot.
+    fn found(&self, slot: &str, imports: &mut Imports) -> String {
         imports.add("pass", ["path_id"]);
+        if !self.access.by_slot {
+            return format!("        path_id = {slot};\n");
+        }
+        imports.add("pass", ["path_count", "walk_place"]);
+        format!("        path_id = {slot};\n        walk_place = 2u * path_count + path_id;\n")
+    }
+
+    /// The condition on which there is a path, and the lines that find it.
+    fn path(&self, imports: &mut Imports) -> (String, String) {
+        let constant = stage_constant(self.entry);
         match self.source {
             Source::Slots => {
                 imports.add("pass", ["pass_info"]);
-                ("index < pass_info.slots".to_owned(), "index".to_owned())
+                return ("index < pass_info.slots".to_owned(), self.found("index", imports));
             }
             Source::Queue if self.queues.kind == QueueKind::None => {
-                let constant = stage_constant(self.entry);
                 imports.add("queue", ["takes", constant.as_str()]);
-                (format!("takes({constant}, index)"), "index".to_owned())
+                return (format!("takes({constant}, index)"), self.found("index", imports));
             }
-            Source::Queue => {
-                let constant = stage_constant(self.entry);
-                imports.add("pass", ["path_count"]);
-                imports.add("control", ["running"]);
-                imports.add("queue", ["queue", constant.as_str()]);
-                (format!("index < running({constant})"), format!("queue[{constant} * path_count + index]"))
+            Source::Queue => {}
+        }
+        imports.add("control", ["running"]);
+        imports.add("queue", [constant.as_str()]);
+        let condition = format!("index < running({constant})");
+        if self.queues.is_first_of_dense(self.entry) {
+            imports.add("queue", ["walk_places"]);
+            return (condition, self.found_in_place("walk_places() + index", imports));
+        }
+        imports.add("pass", ["path_count"]);
+        imports.add("queue", ["queue"]);
+        let entry = format!("queue[{constant} * path_count + index]");
+        let found = match self.inside() {
+            Some(_) => self.found_in_place(&entry, imports),
+            None => self.found(&entry, imports),
+        };
+        (condition, found)
+    }
+
+    /// The lines that name the place and the slot of the path of an invocation in a loop whose paths stand side by side.
+    fn found_in_place(&self, place: &str, imports: &mut Imports) -> String {
+        imports.add("pass", ["path_id", "walk_place"]);
+        imports.add("queue", ["walk_slots"]);
+        format!("        walk_place = {place};\n        path_id = walk_slots[walk_place];\n")
+    }
+
+    /// Where paths and records go when a kernel is over: those that a workgroup counts together ask for places first, then take them.
+    fn leave(&self, targets: &[(String, String)], imports: &mut Imports) -> String {
+        let queues = self.queues;
+        let (mut asks, mut goes, mut moved) = (Vec::new(), String::new(), String::new());
+        for (target, wanted) in targets {
+            let constant = stage_constant(target);
+            imports.add("queue", [constant.as_str()]);
+            let rank = format!("ranks[{}]", asks.len());
+            if queues.is_first_of_dense(target) {
+                asks.push(format!("ask_place({constant}, {wanted}, lane)"));
+                moved = self.move_on(wanted, &format!("place_of({constant}, {rank}, lane)"), imports);
+                continue;
+            }
+            let path = if queues.is_dense(target) { self.queued_as(imports) } else { "path_id" };
+            let (function, line) = if queues.is_waited_for_in_slots(target) {
+                ("wait_for", format!("wait_for({constant}, {wanted}, {path})"))
+            } else if queues.stands_in(target) {
+                ("stand", format!("stand({constant}, {wanted}, {path}, {rank}, lane)"))
+            } else {
+                ("enqueue", format!("enqueue({constant}, {wanted}, {path}, lane)"))
+            };
+            imports.add("queue", [function]);
+            let _ = writeln!(goes, "    {line};");
+            if function != "enqueue" {
+                asks.push(format!("ask_place({constant}, {wanted}, lane)"));
             }
         }
+        for stream in self.gathered {
+            let constant = stream_constant(stream);
+            let (has, gather) = (stream::has_function(stream), stream::gather_function(stream));
+            imports.add("queue", [constant.as_str()]);
+            imports.add("streams", [has.as_str(), gather.as_str()]);
+            let _ = writeln!(goes, "    {gather}(ranks[{}], lane);", asks.len());
+            asks.push(format!("ask_place({constant}, {has}(), lane)"));
+        }
+        if asks.is_empty() {
+            return if goes.is_empty() { goes } else { format!("\n{goes}") };
+        }
+        imports.add("queue", ["ask_place", "take_places"]);
+        format!(
+            "\n    let ranks = array<u32, {}>({});\n    take_places(lane);\n{goes}{moved}",
+            asks.len(),
+            asks.join(", ")
+        )
     }
+
+    /// A path that goes on with the first stage of a loop whose paths stand side by side: its state is stored where it stands then.
+    fn move_on(&self, wanted: &str, place: &str, imports: &mut Imports) -> String {
+        imports.add("pass", ["path_id", "walk_place"]);
+        imports.add("queue", ["next_walk_places", "place_of", "walk_slots"]);
+        format!(
+            "    if {wanted} {{\n        \
+                     walk_place = next_walk_places() + {place};\n        \
+                     walk_slots[walk_place] = path_id;\n\
+             {}    }}\n",
+            lines(&self.access.moved_stores)
+        )
+    }
+}
+
+/// Statements of a path, set off from what stands before them.
+fn lines(statements: &[String]) -> String {
+    let mut text = String::new();
+    for (number, statement) in statements.iter().enumerate() {
+        let _ = writeln!(text, "{}        {statement}", if number == 0 { "\n" } else { "" });
+    }
+    text
 }
 
 /// The instances.
@@ -241,41 +353,6 @@ fn targets(stage: &WiredStage) -> Vec<(String, String)> {
         (target.to_owned(), tests.join(" || "))
     });
     tests.collect()
-}
-
-/// Where paths and records go when a kernel is over: those that a workgroup counts together ask for places first, then take them.
-fn leave(targets: &[(String, String)], gathered: &[String], queues: &Queues, imports: &mut Imports) -> String {
-    let (mut asks, mut goes) = (Vec::new(), String::new());
-    for (target, wanted) in targets {
-        let constant = stage_constant(target);
-        imports.add("queue", [constant.as_str()]);
-        let rank = format!("ranks[{}]", asks.len());
-        let (function, line) = if queues.is_waited_for_in_slots(target) {
-            ("wait_for", format!("wait_for({constant}, {wanted}, path_id)"))
-        } else if queues.stands_in(target) {
-            ("stand", format!("stand({constant}, {wanted}, path_id, {rank}, lane)"))
-        } else {
-            ("enqueue", format!("enqueue({constant}, {wanted}, path_id, lane)"))
-        };
-        imports.add("queue", [function]);
-        let _ = writeln!(goes, "    {line};");
-        if function != "enqueue" {
-            asks.push(format!("ask_place({constant}, {wanted}, lane)"));
-        }
-    }
-    for stream in gathered {
-        let constant = stream_constant(stream);
-        let (has, gather) = (stream::has_function(stream), stream::gather_function(stream));
-        imports.add("queue", [constant.as_str()]);
-        imports.add("streams", [has.as_str(), gather.as_str()]);
-        let _ = writeln!(goes, "    {gather}(ranks[{}], lane);", asks.len());
-        asks.push(format!("ask_place({constant}, {has}(), lane)"));
-    }
-    if asks.is_empty() {
-        return if goes.is_empty() { goes } else { format!("\n{goes}") };
-    }
-    imports.add("queue", ["ask_place", "take_places"]);
-    format!("\n    let ranks = array<u32, {}>({});\n    take_places(lane);\n{goes}", asks.len(), asks.join(", "))
 }
 
 /// The line that gives a slot whose path goes nowhere the next path.
@@ -347,5 +424,7 @@ pub(super) fn reserved_locals() -> BTreeSet<&'static str> {
         "running",
         "pass_info",
         "waits_for",
+        "walk_place",
+        "walk_slots",
     ])
 }

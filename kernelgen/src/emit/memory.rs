@@ -1,5 +1,6 @@
 //! State tables in WGSL: their variables and addresses, and the loads and stores of a kernel.
 
+use super::dense::Dense;
 use super::text::COMPONENTS;
 use crate::analyze::{KernelTraffic, Leaf};
 use crate::config::model::Order;
@@ -14,11 +15,15 @@ pub(super) fn buffer_name(table: &Table) -> String {
 }
 
 /// `package::tables`: the buffers of the path state and where in them a path's record is.
-pub(super) fn module(placement: &Placement) -> String {
-    let mut text = String::from("import package::pass::{path_count, path_id};\n");
-    for table in placement.tables.iter().filter(|table| table.lanes > 0) {
+pub(super) fn module(placement: &Placement, dense: Option<&Dense>) -> String {
+    let mut text = String::from("import package::pass::{path_count, path_id, walk_place};\n");
+    for (index, table) in placement.tables.iter().enumerate().filter(|(_, table)| table.lanes > 0) {
         let name = buffer_name(table);
         let words = table.lanes * table.lane;
+        let (place, places) = match dense.map_or(1, |dense| dense.places(index)) {
+            1 => ("path_id", "path_count".to_owned()),
+            places => ("walk_place", format!("{places}u * path_count")),
+        };
         let _ = write!(
             text,
             "\n/// {} {}: {words} words a path, {}.\n\
@@ -29,7 +34,7 @@ pub(super) fn module(placement: &Placement) -> String {
             table.instances.join(", "),
             describe(table.order),
             lane_type(table.lane),
-            address(table),
+            address(table, place, &places),
         );
     }
     text
@@ -47,13 +52,13 @@ fn lane_type(lane: u32) -> String {
     if lane == 1 { "u32".to_owned() } else { format!("vec{lane}<u32>") }
 }
 
-/// The text of `Table::address`.
-fn address(table: &Table) -> String {
+/// The text of `Table::address`, of a record's place among so many.
+fn address(table: &Table, place: &str, places: &str) -> String {
     match table.order {
-        Order::Aos => format!("path_id * {}u + lane", table.lanes),
-        Order::Soa => "lane * path_count + path_id".to_owned(),
+        Order::Aos => format!("{place} * {}u + lane", table.lanes),
+        Order::Soa => format!("lane * {places} + {place}"),
         Order::Aosoa(block) => {
-            format!("path_id / {block}u * {}u + lane * {block}u + path_id % {block}u", table.lanes * block)
+            format!("{place} / {block}u * {}u + lane * {block}u + {place} % {block}u", table.lanes * block)
         }
     }
 }
@@ -67,10 +72,16 @@ pub(super) struct Access {
     pub loads: Vec<String>,
     /// Statements that write them back.
     pub stores: Vec<String>,
+    /// Those that write what moves on to where it then stands.
+    pub moved_stores: Vec<String>,
     /// Bytes that the loads move, late ones included.
     pub load_bytes: u32,
     /// Bytes that the stores move.
     pub store_bytes: u32,
+    /// Bytes that those of `moved_stores` move.
+    pub moved_bytes: u32,
+    /// Whether tables are loaded or stored by slot whose records move in a loop.
+    pub by_slot: bool,
     /// Buffers used: names of tables' variables.
     pub buffers: BTreeSet<String>,
     /// Functions of codecs used: the codec's name, and the function's.
@@ -95,13 +106,34 @@ impl Access {
     }
 }
 
+/// What a kernel stores elsewhere than where it was loaded: of this, it takes along all that lives on, also what it does not touch.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Carries<'a> {
+    /// Nothing.
+    Nothing,
+    /// Everything, at once.
+    All,
+    /// What is in these tables, when it is known where it goes.
+    Tables(&'a BTreeMap<usize, bool>),
+}
+
+impl Carries<'_> {
+    fn table(self, table: usize) -> bool {
+        match self {
+            Carries::Nothing => false,
+            Carries::All => true,
+            Carries::Tables(tables) => tables.contains_key(&table),
+        }
+    }
+}
+
 /// The statements that move a kernel's leaves between tables and instances; `late` are leaves to be loaded later, by the stages that
-/// use them. A kernel that `carries` takes along all that lives on, also what it does not touch.
+/// use them.
 pub(super) fn access(
     placement: &Placement,
     traffic: &KernelTraffic,
     late: &BTreeMap<BTreeSet<String>, BTreeSet<Leaf>>,
-    carries: bool,
+    carries: Carries<'_>,
 ) -> Access {
     let is_late = |leaf: &Leaf| late.values().any(|leaves| leaves.contains(leaf));
     let first = traffic.loads.iter().filter(|leaf| !is_late(leaf)).cloned().collect();
@@ -124,12 +156,12 @@ pub(super) fn carried_bytes(placement: &Placement, traffic: &KernelTraffic) -> u
         let access = access(placement, traffic, &BTreeMap::new(), carries);
         access.load_bytes + access.store_bytes
     };
-    bytes(true) - bytes(false)
+    bytes(Carries::All) - bytes(Carries::Nothing)
 }
 
 fn push_late(placement: &Placement, stages: &BTreeSet<String>, leaves: &BTreeSet<Leaf>, access: &mut Access) {
     let traffic = KernelTraffic { loads: leaves.clone(), ..KernelTraffic::default() };
-    let memory = Memory { placement, traffic: &traffic, words: words(placement), carries: false };
+    let memory = Memory { placement, traffic: &traffic, words: words(placement), carries: Carries::Nothing };
     let mut own = Access::default();
     let loaded = memory.load_lanes(&mut own);
     memory.fill_leaves(&loaded, &mut own);
@@ -169,8 +201,7 @@ struct Memory<'a> {
     placement: &'a Placement,
     traffic: &'a KernelTraffic,
     words: BTreeMap<Word, Vec<Part<'a>>>,
-    /// Whether what lives on is stored elsewhere than where it was loaded.
-    carries: bool,
+    carries: Carries<'a>,
 }
 
 /// Lanes read as a whole, and the names of words in registers.
@@ -204,11 +235,11 @@ impl Memory<'_> {
     /// Words that the kernel needs in registers: of loaded leaves, and those it stores a part of while the rest stays live; of all that
     /// stay live where it carries them.
     fn needed_words(&self) -> BTreeSet<Word> {
-        let needs = |parts: &Vec<Part<'_>>| {
+        let needs = |(word, parts): &(&Word, &Vec<Part<'_>>)| {
             let loaded = parts.iter().any(|part| self.traffic.loads.contains(part.leaf));
-            loaded || ((self.carries || self.stores_any(parts)) && self.keeps_any(parts))
+            loaded || ((self.carries.table(word.0) || self.stores_any(parts)) && self.keeps_any(parts))
         };
-        self.words.iter().filter(|(_, parts)| needs(parts)).map(|(word, _)| *word).collect()
+        self.words.iter().filter(needs).map(|(word, _)| *word).collect()
     }
 
     fn stores_any(&self, parts: &[Part<'_>]) -> bool {
@@ -260,7 +291,7 @@ impl Memory<'_> {
     }
 
     fn push_load(&self, local: &str, ty: &str, source: &str, access: &mut Access) {
-        if self.carries {
+        if !matches!(self.carries, Carries::Nothing) {
             access.locals.push(format!("var {local}: {ty};"));
             access.loads.push(format!("{local} = {source};"));
         } else {
@@ -322,7 +353,8 @@ impl Memory<'_> {
                 continue;
             };
             let encode = format!("encode_{}", codec.name);
-            access.stores.push(format!("let {} = {encode}({leaf});", encoded(leaf)));
+            let store = format!("let {} = {encode}({leaf});", encoded(leaf));
+            self.push_store(self.placement.slots[leaf].table, store, 0, access);
             access.codecs.insert((codec.name.clone(), encode));
         }
     }
@@ -331,7 +363,7 @@ impl Memory<'_> {
         let lanes: BTreeSet<Lane> = self
             .words
             .iter()
-            .filter(|(_, parts)| self.stores_any(parts) || (self.carries && self.keeps_any(parts)))
+            .filter(|(word, parts)| self.stores_any(parts) || (self.carries.table(word.0) && self.keeps_any(parts)))
             .map(|(word, _)| self.lane_of(*word).0)
             .collect();
         for lane in lanes {
@@ -348,29 +380,29 @@ impl Memory<'_> {
         let first = lane.1 * table.lane;
         let stores: Vec<WordStore> =
             (first..first + table.lane).map(|word| self.word_store((lane.0, word), loaded)).collect();
-        let values = stores.iter().filter(|store| self.new_value(store).is_some()).count();
+        let carries = self.carries.table(lane.0);
+        let values = stores.iter().filter(|store| new_value(store, carries).is_some()).count();
         let lost = stores.iter().any(|store| matches!(store, WordStore::Keep(None)));
         if !lost && 2 * values >= stores.len() {
             let value = self.lane_value(lane, &stores);
-            access.stores.push(format!("{target} = {value};"));
-            access.store_bytes += 4 * table.lane;
+            self.push_store(lane.0, format!("{target} = {value};"), 4 * table.lane, access);
             return;
         }
         for (store, component) in stores.iter().zip(COMPONENTS) {
-            if let Some(value) = self.new_value(store) {
-                access.stores.push(format!("{target}.{component} = {value};"));
-                access.store_bytes += 4;
+            if let Some(value) = new_value(store, carries) {
+                self.push_store(lane.0, format!("{target}.{component} = {value};"), 4, access);
             }
         }
     }
 
-    /// What has to be stored, if anything: what is new, and where words are carried also what stays.
-    fn new_value<'s>(&self, store: &'s WordStore) -> Option<&'s str> {
-        match store {
-            WordStore::Value(value) => Some(value),
-            WordStore::Keep(Some(value)) if self.carries => Some(value),
-            _ => None,
-        }
+    fn push_store(&self, table: usize, store: String, bytes: u32, access: &mut Access) {
+        let moved = matches!(self.carries, Carries::Tables(tables) if tables.contains_key(&table));
+        let (stores, sum) = match moved {
+            true => (&mut access.moved_stores, &mut access.moved_bytes),
+            false => (&mut access.stores, &mut access.store_bytes),
+        };
+        stores.push(store);
+        *sum += bytes;
     }
 
     fn word_store(&self, word: Word, loaded: &Loaded) -> WordStore {
@@ -444,6 +476,15 @@ impl Memory<'_> {
         let together = words.iter().zip(word.1..).all(|(own, expected)| own.word == expected);
         let fits = part.component == 0 && words.len() > 1 && words.len() <= room;
         (fits && together).then_some((part.leaf, words.len()))
+    }
+}
+
+/// What has to be stored, if anything: what is new, and where words are carried also what stays.
+fn new_value(store: &WordStore, carries: bool) -> Option<&str> {
+    match store {
+        WordStore::Value(value) => Some(value),
+        WordStore::Keep(Some(value)) if carries => Some(value),
+        _ => None,
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod chain;
 mod contract;
+mod dense;
 mod entry;
 mod film;
 mod fusion;
@@ -32,6 +33,7 @@ use crate::link::Modules;
 use crate::plan::{Layers, Plan, Tally};
 use crate::report::{self, Report};
 use crate::source::{FileKind, Sources};
+use dense::Dense;
 use indexmap::IndexSet;
 use program::Program;
 use queue::Queues;
@@ -75,6 +77,10 @@ pub fn generate(sources: &mut Sources, selection: &Selection) -> Result<Parts, V
     let placement = layout::assign(&variant, &liveness)?;
     let rounds = Rounds::new(&variant, &wiring.fusion).map_err(|finding| vec![finding])?;
     let mut queues = queues(&wiring, &variant, &rounds);
+    queues.dense = dense(&wiring, &variant, &rounds, &queues, &placement, &liveness);
+    if let Some(dense) = &queues.dense {
+        queues.ordered.retain(|stage| *stage != dense.first);
+    }
     queues.packed = packed(&wiring, &variant, &rounds, &queues, &placement, &liveness);
     let layers = film::used(layers, &wiring.splats);
     add_state_modules(sources, &mut modules, &variant, &wiring, &placement, &queues, rounds.most);
@@ -182,7 +188,7 @@ fn add_state_modules(
         ("next", chain::module(wiring)),
         ("queue", queue::queue_module(queues)),
         ("sort", sort::module(queues.workgroup)),
-        ("tables", memory::module(placement)),
+        ("tables", memory::module(placement, queues.dense.as_ref())),
         ("stored", stored::module(&variant.pipeline, &placement.leaves)),
         ("streams", stream::module(&variant.pipeline, wiring, room::records(&variant.schedule), queues.gathers())),
     ];
@@ -201,6 +207,7 @@ fn queues(wiring: &Wiring, variant: &Variant, rounds: &Rounds) -> Queues {
     Queues {
         ordered: stages.iter().filter(mixed).cloned().collect(),
         packed: None,
+        dense: None,
         stages,
         streams: batched.map(|(name, _)| name.clone()).collect(),
         kind,
@@ -219,10 +226,32 @@ fn packed(
     placement: &Placement,
     liveness: &Liveness,
 ) -> Option<String> {
-    let packs = variant.schedule.order == PathOrder::Packed;
-    let meets = |stage: &&String| packs && rounds.is_beside_inner(&wiring.fusion, stage);
+    let packs = matches!(variant.schedule.order, PathOrder::Packed | PathOrder::Dense);
+    let enters = |stage: &str| {
+        let first = queues.dense.as_ref().map(|dense| &dense.first);
+        first.is_some_and(|first| wiring.fusion.queued[stage].feeds.contains(first))
+    };
+    let meets = |stage: &&String| packs && rounds.is_beside_inner(&wiring.fusion, stage) && !enters(stage);
     let extra = |stage: &&String| liveness.kernels.get(*stage).map(|traffic| memory::carried_bytes(placement, traffic));
     queues.ordered.iter().filter(meets).min_by_key(extra).cloned()
+}
+
+/// The loop whose paths stand side by side, if the schedule wants them to.
+fn dense(
+    wiring: &Wiring,
+    variant: &Variant,
+    rounds: &Rounds,
+    queues: &Queues,
+    placement: &Placement,
+    liveness: &Liveness,
+) -> Option<Dense> {
+    let wanted = variant.schedule.order == PathOrder::Dense && queues.kind != QueueKind::None && !queues.regenerates;
+    if !wanted {
+        return None;
+    }
+    let dense = Dense::new(&wiring.fusion, rounds, queues, placement, liveness)?;
+    // Sorted, paths would not stand where their state is.
+    wiring.stages[&dense.first].key.is_none().then_some(dense)
 }
 
 /// K0210: a leaf that some stage reads although no stage before it surely wrote it.

@@ -244,6 +244,9 @@ override picture_height: u32;
 /// The path slot of this invocation.
 var<private> path_id: u32;
 
+/// In a loop whose paths stand side by side, where that of this invocation stands in the tables of the loop.
+var<private> walk_place: u32;
+
 /// Index of the path's pixel, y * width + x. Neighbours in the order of paths are neighbours in a tile of 8 x 8 pixels.
 fn path_pixel() -> u32 {
     let width = picture_width;

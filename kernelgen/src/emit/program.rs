@@ -4,7 +4,7 @@ use super::chain;
 use super::fusion::Chain;
 use super::housekeeping::{self, Entries, Prepared};
 use super::kernel::{self, Frame, Source};
-use super::memory::{self, Access};
+use super::memory::{self, Access, Carries};
 use super::queue::{self, Queues};
 use super::room;
 use super::rounds::{InnerLoop, Rounds};
@@ -12,10 +12,10 @@ use super::sort;
 use super::stream;
 use super::tally;
 use super::wiring::{WiredKey, Wiring};
-use crate::analyze::{self, KernelTraffic, Liveness};
+use crate::analyze::{self, KernelTraffic, Leaf, Liveness};
 use crate::config::model::{Accumulate, LoadAt, QueueKind, RayKind, Variant};
 use crate::diagnostic::Diagnostic;
-use crate::layout::{InPlace, Placement};
+use crate::layout::{InPlace, Placement, Table};
 use crate::link::{self, Constants, LinkedBinding, Modules, Root};
 use crate::plan::{self, Binding, Buffer, Kernel, Layers, Needs, Plan, Role, SLOT_GRAIN, Size, Step, Tally};
 use crate::source::{FileKind, Sources};
@@ -86,6 +86,8 @@ struct Draft {
     stages: Vec<String>,
     load_bytes: u32,
     store_bytes: u32,
+    moved_bytes: u32,
+    entry_bytes: u32,
     rays: Option<RayKind>,
 }
 
@@ -185,7 +187,8 @@ impl Builder<'_> {
         let rays = self.rays(&self.program.wiring.fusion.queued[stage]);
         let queues = self.program.queues;
         let (ordered, packed) = (queues.is_ordered(stage), queues.is_packed(stage));
-        Prepared { entries: Entries::Stage { stage: stage.to_owned(), ordered, packed }, rays }
+        let turns = queues.is_first_of_dense(stage);
+        Prepared { entries: Entries::Stage { stage: stage.to_owned(), ordered, packed, turns }, rays }
     }
 
     /// What all rays of a kernel are counted as, whoever counts by how many paths it takes; several stages count by themselves.
@@ -239,10 +242,10 @@ impl Builder<'_> {
 
     /// The kernel that computes keys loads what they depend on, and nothing else.
     fn count_keys(&mut self, stage: &str, key: &WiredKey) -> usize {
-        let Program { queues, placement, .. } = *self.program;
+        let queues = self.program.queues;
         let name = format!("count_keys_{stage}");
         let traffic = KernelTraffic { loads: key.reads.keys().cloned().collect(), ..KernelTraffic::default() };
-        let access = memory::access(placement, &traffic, &BTreeMap::new(), false);
+        let access = self.access(&traffic, &BTreeMap::new(), Carries::Nothing);
         let (kernel, source) = (name.as_str(), Source::Queue);
         let (packs, next, gathered) = (false, None, [].as_slice());
         let frame = Frame { kernel, entry: stage, source, queues, access: &access, packs, next, gathered };
@@ -279,17 +282,27 @@ impl Builder<'_> {
         let packs = source == Source::Queue && queues.is_packed(entry);
         let starts_again = source == Source::Slots && wiring.fusion.queued.contains_key(entry);
         let kernel = if starts_again { format!("{entry}_first") } else { entry.to_owned() };
+        let moves = match &queues.dense {
+            Some(dense) if chain.feeds.contains(&dense.first) => Some(&dense.tables),
+            _ => None,
+        };
+        let carries = match moves {
+            Some(tables) => Carries::Tables(tables),
+            None if packs => Carries::All,
+            None => Carries::Nothing,
+        };
+        let stays = matches!(carries, Carries::Nothing);
         let access = match liveness.kernels.get(entry) {
             Some(traffic) => {
                 let late = match self.program.variant.schedule.load {
                     LoadAt::Use => chain::late_leaves(wiring, chain, traffic),
                     LoadAt::Entry => BTreeMap::new(),
                 };
-                // A path that moves into another slot takes along also what is a copy.
-                let in_place = if packs { InPlace::default() } else { self.program.placement.in_place(traffic) };
+                // A path that moves takes along also what is a copy.
+                let in_place = if stays { self.program.placement.in_place(traffic) } else { InPlace::default() };
                 let moved = in_place.spare(traffic);
                 self.in_place.insert(kernel.clone(), in_place);
-                memory::access(self.program.placement, &moved, &late, packs)
+                self.access(&moved, &late, carries)
             }
             None => Access::default(),
         };
@@ -308,8 +321,27 @@ impl Builder<'_> {
             stages: std::iter::once(entry).chain(others.map(String::as_str)).map(str::to_owned).collect(),
             load_bytes: access.load_bytes,
             store_bytes: access.store_bytes,
+            moved_bytes: access.moved_bytes,
+            entry_bytes: if source == Source::Queue { 4 * queues.entry_words(entry) } else { 0 },
             rays: self.rays(chain),
         })
+    }
+
+    fn access(
+        &self,
+        traffic: &KernelTraffic,
+        late: &BTreeMap<BTreeSet<String>, BTreeSet<Leaf>>,
+        carries: Carries<'_>,
+    ) -> Access {
+        let Program { placement, queues, .. } = *self.program;
+        let access = memory::access(placement, traffic, late, carries);
+        let used = |table: usize| {
+            let address = format!("{}_address(", memory::buffer_name(&placement.tables[table]));
+            access.all_loads().chain(&access.stores).any(|statement| statement.contains(&address))
+        };
+        let mut moving = queues.dense.iter().flat_map(|dense| &dense.tables);
+        let by_slot = moving.any(|(table, by_slot)| *by_slot && used(*table));
+        Access { by_slot, ..access }
     }
 
     /// The streams that a kernel may push to, if workgroups gather their records.
@@ -327,6 +359,7 @@ impl Builder<'_> {
             text: kernel::consumer_kernel(&kernel, name, stream, workgroup),
             name: kernel,
             workgroup,
+            entry_bytes: 4 * stream::record_words(stream),
             rays: stream.rays,
             ..Draft::default()
         })
@@ -373,6 +406,7 @@ impl Builder<'_> {
         self.effects_seen.extend(linked.constants_seen);
         let declares = |name: &&str| linked.items.iter().any(|(_, item)| item == *name);
         let overrides = plan::OVERRIDES.iter().filter(|name| declares(name)).map(|name| (*name).to_owned()).collect();
+        let numbered = !draft.stages.is_empty() && linked.bindings.iter().any(|binding| binding.name == "path_numbers");
         let kernel = Kernel {
             name: name.clone(),
             entry,
@@ -383,6 +417,8 @@ impl Builder<'_> {
             stages: draft.stages.clone(),
             load_bytes: draft.load_bytes,
             store_bytes: draft.store_bytes,
+            moved_bytes: draft.moved_bytes,
+            entry_bytes: draft.entry_bytes + if numbered { 4 } else { 0 },
             rays: draft.rays,
         };
         Ok((kernel, linked.bindings))
@@ -393,6 +429,7 @@ impl Builder<'_> {
         let needs = self.needs();
         let tallies = self.tallies(&buffers);
         let placement = self.program.placement;
+        let (dense, pushed_bytes) = (self.dense(), self.pushed_bytes());
         let kernels = self.kernels.into_iter().map(|(kernel, bindings)| {
             let binding = |binding: LinkedBinding| {
                 let buffer = buffers.get_index_of(&binding.name)?;
@@ -405,6 +442,8 @@ impl Builder<'_> {
             program,
             counters: queue::counters().collect(),
             entries: queue::entry_words(),
+            pushed_bytes,
+            dense,
             tallies,
             layers: self.program.layers.to_vec(),
             film: self.program.variant.schedule.accumulate,
@@ -416,6 +455,19 @@ impl Builder<'_> {
             buffers: buffers.into_values().collect(),
         };
         Built { plan, in_place: self.in_place, effects_seen: self.effects_seen }
+    }
+
+    /// The queue of the stage that a loop begins with whose paths stand side by side.
+    fn dense(&self) -> Option<u32> {
+        let queues = self.program.queues;
+        queues.of_stage(&queues.dense.as_ref()?.first)
+    }
+
+    /// Bytes that joining each queue takes: a word for a path, or a record.
+    fn pushed_bytes(&self) -> Vec<u32> {
+        let Program { queues, wiring, .. } = *self.program;
+        let records = queues.streams.iter().map(|stream| 4 * stream::record_words(&wiring.streams[stream]));
+        queues.stages.iter().map(|_| 4).chain(records).collect()
     }
 
     /// Generated buffers that a kernel uses (film, pass and control always), then scene resources in order of first use.
@@ -449,15 +501,18 @@ impl Builder<'_> {
         let per_path = |bytes: u32| Size { per_path: u64::from(bytes), ..Size::default() };
         let fixed = |bytes: u32| Size { fixed: u64::from(bytes), ..Size::default() };
         let tables = program.placement.tables.iter();
-        let mut buffers: Vec<Buffer> = tables
-            .map(|table| buffer(&memory::buffer_name(table), Role::State, per_path(table.bytes_per_path())))
-            .collect();
+        let places = |index| program.queues.dense.as_ref().map_or(1, |dense| dense.places(index));
+        let state = |(index, table): (usize, &Table)| {
+            buffer(&memory::buffer_name(table), Role::State, per_path(places(index) * table.bytes_per_path()))
+        };
+        let mut buffers: Vec<Buffer> = tables.enumerate().map(state).collect();
         let channel = if program.variant.schedule.accumulate == Accumulate::FixedI64 { 8 } else { 4 };
         let film = Size { per_pixel: 3 * channel * u64::from(plan::planes(program.layers)), ..Size::default() };
         buffers.extend([
             buffer("queue", Role::Queue, per_path(4 * program.queues.stages.len() as u32)),
             buffer("waits_for", Role::Queue, per_path(4)),
             buffer("path_numbers", Role::Queue, per_path(4)),
+            buffer("walk_slots", Role::Queue, per_path(8)),
             buffer("keyed_paths", Role::Queue, per_path(8)),
             buffer("key_bins", Role::Queue, fixed(2 * 4 * sort::BINS)),
             buffer("control", Role::Control, fixed(4 * program.queues.control_words())),

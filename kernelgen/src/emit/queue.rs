@@ -1,5 +1,6 @@
 //! Queues and counters: the modules `control` and `queue`.
 
+use super::dense::Dense;
 use super::text::{stage_constant, stream_constant};
 use crate::config::model::QueueKind;
 use crate::plan::{Counter, EntryWords};
@@ -45,6 +46,8 @@ pub(super) struct Queues {
     pub ordered: Vec<String>,
     /// The one of them whose kernel gives its paths slots side by side.
     pub packed: Option<String>,
+    /// The loop whose paths stand side by side.
+    pub dense: Option<Dense>,
     /// Batched streams.
     pub streams: Vec<String>,
     /// How a path finds its place; with `None`, paths are marked instead.
@@ -59,7 +62,16 @@ impl Queues {
     /// No queue.
     pub(super) fn none(workgroup: u32) -> Queues {
         let (stages, ordered, streams) = (Vec::new(), Vec::new(), Vec::new());
-        Queues { stages, ordered, packed: None, streams, kind: QueueKind::None, regenerates: false, workgroup }
+        Queues {
+            stages,
+            ordered,
+            packed: None,
+            dense: None,
+            streams,
+            kind: QueueKind::None,
+            regenerates: false,
+            workgroup,
+        }
     }
 
     /// Queues in all.
@@ -86,6 +98,23 @@ impl Queues {
     /// Whether the paths of a stage's kernel move into slots side by side.
     pub(super) fn is_packed(&self, stage: &str) -> bool {
         self.packed.as_deref() == Some(stage)
+    }
+
+    /// Whether a stage takes paths that stand side by side.
+    pub(super) fn is_dense(&self, stage: &str) -> bool {
+        self.dense.as_ref().is_some_and(|dense| dense.inside.contains(stage))
+    }
+
+    /// Whether a loop whose paths stand side by side begins with this stage.
+    pub(super) fn is_first_of_dense(&self, stage: &str) -> bool {
+        self.dense.as_ref().is_some_and(|dense| dense.first == stage)
+    }
+
+    /// Words that the kernel of a queue moves to find a path: its entry, its slot where it stands in a place, its number where it gets
+    /// another slot.
+    pub(super) fn entry_words(&self, stage: &str) -> u32 {
+        let entry = u32::from(!self.is_first_of_dense(stage));
+        entry + u32::from(self.is_packed(stage)) + u32::from(self.is_dense(stage))
     }
 
     /// Whether slots know the numbers of their paths, which do not follow from theirs.
@@ -115,12 +144,17 @@ impl Queues {
 
     /// Words of the control buffer.
     pub(super) fn control_words(&self) -> u32 {
-        self.taken_word() + u32::from(self.regenerates)
+        self.walks_word() + u32::from(self.dense.is_some())
     }
 
     /// The word that counts the paths which slots have taken, behind those of the queues.
     fn taken_word(&self) -> u32 {
         STRIDE * (1 + self.count())
+    }
+
+    /// The word that says where the places of a turn begin.
+    fn walks_word(&self) -> u32 {
+        self.taken_word() + u32::from(self.regenerates)
     }
 }
 
@@ -149,6 +183,10 @@ pub(super) fn control_module(queues: &Queues, rounds: u32) -> String {
     if queues.regenerates {
         let word = queues.taken_word();
         let _ = write!(text, "\n/// Paths of the pass that slots have taken.\nconst CONTROL_TAKEN: u32 = {word}u;\n");
+    }
+    if queues.dense.is_some() {
+        let word = queues.walks_word();
+        let _ = write!(text, "\n/// Where the places of this turn begin.\nconst CONTROL_WALKS: u32 = {word}u;\n");
     }
     let _ = write!(
         text,
@@ -276,6 +314,9 @@ pub(super) fn queue_module(queues: &Queues) -> String {
     }
     if queues.packed.is_some() {
         text.push_str(PACK);
+    }
+    if queues.dense.is_some() {
+        text = format!("import package::control::CONTROL_WALKS;\n{text}{WALK_PLACES}");
     }
     text.push_str(APPEND);
     if queues.regenerates {
@@ -495,6 +536,27 @@ fn packed_slot(number: u32, index: u32, lane: u32) -> u32 {
         }
     }
     return queue[first_place + first] + index - first;
+}
+";
+
+/// Places of two turns: one is read, the other written.
+const WALK_PLACES: &str = r"
+/// The slots of the paths that stand side by side, by place.
+var<storage, read_write> walk_slots: array<u32>;
+
+/// Where the places of this turn begin.
+fn walk_places() -> u32 {
+    return atomicLoad(&control[CONTROL_WALKS]);
+}
+
+/// Where those of the next begin.
+fn next_walk_places() -> u32 {
+    return path_count - walk_places();
+}
+
+/// Begins a turn.
+fn turn_walk_places() {
+    atomicStore(&control[CONTROL_WALKS], next_walk_places());
 }
 ";
 

@@ -13,11 +13,14 @@ pub(super) const BINS: u32 = 256;
 
 /// The kernel that computes and counts the keys of the paths that wait for a stage.
 pub(super) fn count_kernel(frame: Frame<'_>, key: &WiredKey) -> String {
+    let mut imports = Imports::default();
+    let path = frame.queued_as(&mut imports);
     let mut filling = Filling {
+        imports,
         heading: format!("Key `{}`", key.entry.name),
         locals: "    var bin = NO_BIN;\n".to_owned(),
         instances: key.instances.iter().cloned().collect(),
-        end: "\n    count_key(bin, path_id, index, lane);\n".to_owned(),
+        end: format!("\n    count_key(bin, {path}, index, lane);\n"),
         ..Filling::default()
     };
     filling.body = format!("        bin = {} % BINS;\n", call(&key.entry.name, &key.instances));

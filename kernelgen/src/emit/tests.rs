@@ -6,6 +6,7 @@ use crate::source::{FileKind, Sources};
 use crate::{Generated, Refusal};
 
 mod copies;
+mod dense;
 mod schedules;
 
 const PIPELINE: &str = r#"

@@ -82,7 +82,7 @@ impl Summary<'_> {
             0 => writeln!(out, "kernels       not timed: the adapter has no timestamps inside passes")?,
             passes => writeln!(out, "kernels       times are means of {passes} measured passes")?,
         }
-        writeln!(out, "  ms/pass  ms/Msample  paths/sample  bytes/path    GB/s  compile s  SPIR-V B")?;
+        writeln!(out, "  ms/pass  ms/Msample  paths/sample  bytes/sample    GB/s  compile s  SPIR-V B")?;
         let times = self.measured.ms_per_pass.as_ref();
         for kernel in &profile.kernels {
             let time = times.and_then(|times| times.get(&kernel.name)).copied();
@@ -97,11 +97,11 @@ fn write_kernel(out: &mut String, kernel: &KernelMeasurements, ms_per_pass: Opti
         |value: Option<f64>, decimals: usize| value.map_or(String::new(), |value| format!("{value:.decimals$}"));
     writeln!(
         out,
-        "{:>9}  {:>10}  {:>12.3}  {:>10}  {:>6}  {:>9.3}  {:>8}   {}",
+        "{:>9}  {:>10}  {:>12.3}  {:>12}  {:>6}  {:>9.3}  {:>8}   {}",
         known(ms_per_pass, 3),
         known(kernel.ms_per_msample, 3),
         kernel.entries_per_sample,
-        kernel.load_bytes + kernel.store_bytes,
+        known(Some(kernel.bytes_per_sample()).filter(|&bytes| bytes > 0.0), 1),
         known(kernel.gb_per_s, 2),
         kernel.compile_seconds,
         kernel.spirv_bytes,

@@ -46,6 +46,8 @@ fn kernel(name: &str, text: String, bindings: &[(usize, Access)], rays: Option<R
         stages: Vec::new(),
         load_bytes: 0,
         store_bytes: 0,
+        moved_bytes: 0,
+        entry_bytes: 0,
         rays,
     }
 }
@@ -97,6 +99,8 @@ fn plan(film: Accumulate) -> Plan {
         counters: vec![counter("rays_primary", 1), counter("rays_visibility", 2), counter("overflow", 4)],
         // `deep` takes as many as `emit` has counted.
         entries: EntryWords { first: 0, stride: 1 },
+        pushed_bytes: Vec::new(),
+        dense: None,
         tallies: Vec::new(),
         layers: Vec::new(),
         film,

@@ -12,7 +12,7 @@ import package::transport::strategy::{first_joined, implicit_counts, is_used};
 /// Ends an eye walk in the sky: the implicit strategy for the light at infinity, weighted against sampling its direction.
 fn escape_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
     if HAS_SKY {
-        let edges = path.eye_length + 1u;
+        let edges = eye.length + 1u;
         if implicit_counts(edges, first_joined(path.light_length)) {
             var rivals = real(0.0);
             if edges > 1u {

@@ -25,6 +25,11 @@ fn seed_connect(eye: ptr<function, Walk>, light: ptr<function, Walk>, path: ptr<
     if sent && met && (s + t < max_edges || last_ray == last_ray_light) {
         return EYE;
     }
+    return next_light_vertex(light);
+}
+
+/// What a path goes on with when its eye walk is over: the light walk, if the ray from its newest vertex has met a surface.
+fn next_light_vertex(light: ptr<function, Walk>) -> u32 {
     if light.pdf_w > 0.0 && light.hit.prim != NO_PRIM {
         return LIGHT;
     }

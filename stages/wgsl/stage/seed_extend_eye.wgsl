@@ -1,6 +1,6 @@
 import package::real::real;
 import package::state::{Path, Vertex, Walk};
-import package::outcome::{ENDED, SCATTERED};
+import package::outcome::SCATTERED;
 import package::params::{frozen_reverse_pdfs, max_edges, weigh_direct_particle};
 import package::features::HAS_AREA_LIGHT;
 import package::film::splat;
@@ -10,6 +10,7 @@ import package::surface::surface::{NO_LIGHT, Surface};
 import package::surface::material::{emission_at, is_emissive, material_at};
 import package::bsdf::bsdf::{RADIANCE, bsdf_at, is_connectable, reverse_pdf_of_sample, sample_bsdf};
 import package::light::triangle_light::{emission_pdf_w, triangle_light_pdf_area};
+import package::stage::seed_connect::next_light_vertex;
 import package::transport::advance::surface_cosine;
 import package::transport::dimension::eye_vertex;
 import package::transport::seed_join::{join_light, light_side};
@@ -33,7 +34,7 @@ fn seed_extend_eye(eye: ptr<function, Walk>, light: ptr<function, Walk>, vertex:
         }
     }
     if s + t > max_edges {
-        return ENDED;
+        return next_light_vertex(light);
     }
     let outgoing = -eye.direction;
     let bsdf = bsdf_at(surface, material_at(surface), outgoing);
@@ -44,12 +45,12 @@ fn seed_extend_eye(eye: ptr<function, Walk>, light: ptr<function, Walk>, vertex:
         join_light(eye, light, surface, bsdf, side, eye.mis);
     }
     if s >= eye_rays(t) {
-        return ENDED;
+        return next_light_vertex(light);
     }
     let random = random4(WALK_EYE, eye_vertex(s, t), DIMENSION_SCATTER);
     var sample = sample_bsdf(bsdf, outgoing, random.xyz, RADIANCE);
     if is_lost(sample) || !survives(eye, &sample, bsdf, s, random.w, RADIANCE) {
-        return ENDED;
+        return next_light_vertex(light);
     }
     if !frozen_reverse_pdfs {
         eye.mis = closed_by_event(sum, reverse_pdf_of_sample(bsdf, outgoing, sample), sample);

@@ -20,8 +20,8 @@ import package::transport::walk::{arrive, is_absorbed};
 /// Vertex x_s of the eye walk that belongs to light vertex y_t: adds emission that it met (path of s edges), joins x_s to y_t
 /// (s + t edges) and scatters.
 fn shade_eye(eye: ptr<function, Walk>, light: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
-    path.eye_length += 1u;
-    let s = path.eye_length;
+    eye.length += 1u;
+    let s = eye.length;
     let t = path.light_length;
     let surface = arrive(eye);
     let sums = meet_light(eye, surface, s, t);

@@ -10,8 +10,8 @@ import package::transport::walk::arrive;
 /// Vertex x_s of the eye walk that belongs to two light vertices: as `shade_eye`, but joins x_s to both, `first` and, where the light
 /// walk got so far, the next, `light`.
 fn shade_eye_pair(eye: ptr<function, Walk>, first: ptr<function, Walk>, light: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
-    path.eye_length += 1u;
-    let s = path.eye_length;
+    eye.length += 1u;
+    let s = eye.length;
     let last = path.light_length;
     let t = first_joined(last);
     let surface = arrive(eye);

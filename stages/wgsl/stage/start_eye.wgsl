@@ -12,7 +12,7 @@ import package::transport::walk::begin_eye;
 /// Starts the eye walk that belongs to light vertex y_t, t = `path.light_length`, or to it and those before, with random numbers of
 /// its own.
 fn start_eye(eye: ptr<function, Walk>, path: ptr<function, Path>) -> u32 {
-    path.eye_length = 0u;
+    eye.length = 0u;
     let first = first_joined(path.light_length);
     if counting == counting_realised {
         for (var edges = select(2u, 1u, first == 1u); edges <= eye_limit(first); edges += 1u) {

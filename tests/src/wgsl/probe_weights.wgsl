@@ -329,7 +329,7 @@ fn sum_of_eye_walk(light_walks: ptr<function, array<Walk, MOST_VERTICES>>) -> re
         }
         if s == k && ends_at_infinity() {
             eye.direction = forced_direction(s - 1u, s);
-            path.eye_length = s - 1u;
+            eye.length = s - 1u;
             escape_eye(&eye, &path);
             break;
         }
@@ -345,7 +345,7 @@ fn shade_vertex(eye: ptr<function, Walk>, light_walks: ptr<function, array<Walk,
     var path: Path;
     for (var turn = select(TURN_JOIN, TURN_GO_ON, s == forced_edges); turn <= TURN_GO_ON; turn += 1u) {
         var walk = *eye;
-        path.eye_length = s - 1u;
+        walk.length = s - 1u;
         path.light_length = select(1u, forced_edges - s, turn == TURN_JOIN);
         var light = light_walks[path.light_length];
         if turn == TURN_COINCIDE {

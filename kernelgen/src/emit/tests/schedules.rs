@@ -384,13 +384,16 @@ fn a_start_stage_that_is_routed_to_has_two_kernels() {
 }
 
 /// `trace` and `shade` lead to one another, and a walk that ends starts over at `emit`.
-fn with_an_inner_loop(set: &[(&str, &str)]) -> Plan {
+pub(super) fn with_an_inner_loop(set: &[(&str, &str)]) -> Plan {
+    let result = crate::generate(&sources(&inner_loop_pipeline(), LAYOUT, STAGES), &selection(set));
+    result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan
+}
+
+/// The pipeline of that plan.
+pub(super) fn inner_loop_pipeline() -> String {
     let loops = "rounds = \"4 * max_edges\"\n\
         inner = { stage = \"trace\", turns = \"max_edges - round\", rounds = \"max_edges - 1\" }\n";
-    let pipeline =
-        PIPELINE.replace("rounds = \"max_edges\"\n", loops).replace("on.miss = \"end\"", "on.miss = \"emit\"");
-    let result = crate::generate(&sources(&pipeline, LAYOUT, STAGES), &selection(set));
-    result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan
+    PIPELINE.replace("rounds = \"max_edges\"\n", loops).replace("on.miss = \"end\"", "on.miss = \"emit\"")
 }
 
 #[test]

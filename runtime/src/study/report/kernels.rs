@@ -14,14 +14,14 @@ pub fn section_of(results: &Results, scene: &str) -> String {
     if profiles.is_empty() {
         return String::new();
     }
-    let doc = "Of the first repetition. Bytes are those of the path state that the generator predicts; GB/s are these bytes over the \
-               kernel's device time, beside their share of the device's copy rate. Queues are counted in passes of their own.";
+    let doc = "Of the first repetition. Bytes are those that the generator predicts: path state, entries of queues, records of streams, \
+               not what stages look up in the scene. GB/s are these bytes over the kernel's device time, beside their share of the device's copy rate. Queues are counted in passes of their own.";
     let copy_rate = results.copy_rate.as_ref().map(|rate| rate.gb_per_s);
     let mut inner = element("p", "", doc);
     inner += &compared(&profiles, "Device time, ms per million samples", &|kernel| kernel.ms_per_msample);
-    inner += &compared(&profiles, "State, GB/s", &|kernel| kernel.gb_per_s);
+    inner += &compared(&profiles, "Moved, GB/s", &|kernel| kernel.gb_per_s);
     if let Some(copy_rate) = copy_rate {
-        inner += &compared(&profiles, "State, share of the copy rate, %", &|kernel| {
+        inner += &compared(&profiles, "Moved, share of the copy rate, %", &|kernel| {
             Some(100.0 * kernel.gb_per_s? / copy_rate)
         });
     }
@@ -60,8 +60,8 @@ fn compared(
 fn of_variant(variant: &str, profile: &KernelProfile, copy_rate: Option<f64>) -> String {
     let columns = [
         "paths per sample",
-        "bytes loaded",
-        "bytes stored",
+        "bytes of state per sample",
+        "bytes of queues and records per sample",
         "ms per million samples",
         "GB/s",
         "% of the copy rate",
@@ -73,8 +73,8 @@ fn of_variant(variant: &str, profile: &KernelProfile, copy_rate: Option<f64>) ->
         let share = kernel.gb_per_s.zip(copy_rate).map(|(rate, copy_rate)| 100.0 * rate / copy_rate);
         let cells = [
             shown(kernel.entries_per_sample),
-            kernel.load_bytes.to_string(),
-            kernel.store_bytes.to_string(),
+            shown(kernel.state_bytes_per_sample),
+            shown(kernel.queue_bytes_per_sample),
             known(kernel.ms_per_msample),
             known(kernel.gb_per_s),
             known(share),

@@ -104,12 +104,12 @@ const MEASURES: &[Measure] = &[
     Measure {
         title: "Bytes moved",
         unit: "bytes per sample",
-        doc: "State that kernels load and store, as the generator predicts: bytes of a path in a kernel, times the paths that it took.",
+        doc: "What kernels load and store, as the generator predicts: path state, entries of queues, records of streams, times the paths that they took and sent on. What stages look up in the scene is left out.",
         value: |run| kernels_of(run).map(KernelProfile::bytes_per_sample),
         chart: Some(Scale::Linear),
     },
     Measure {
-        title: "Rate of state",
+        title: "Rate of memory",
         unit: "GB/s",
         doc: "Bytes moved over the device time of all kernels; the tables of kernels show it one by one.",
         value: |run| kernels_of(run).and_then(KernelProfile::gb_per_s),
