@@ -102,11 +102,11 @@ fn every_schedule() {
     }
 }
 
-/// What an adapter with memory of its own takes by default: inner loops, queues in order, paths that close up.
+/// What an adapter with memory of its own takes by default: inner loops, paths that move where they stand in queues, and close up.
 #[test]
 fn the_flagship_as_a_gpu_runs_it() {
-    let generated = generate(selection("sbdpt", "compact", "ordered", "f32", false));
-    insta::assert_snapshot!("pipeline_sbdpt_compact_ordered", text_of(&generated));
+    let generated = generate(selection("sbdpt", "split_compact", "ordered", "f32", false));
+    insta::assert_snapshot!("pipeline_sbdpt_split_compact_ordered", text_of(&generated));
 }
 
 /// The seed's paths all meet at `construct_eye`, too, which touches hardly any of their state.

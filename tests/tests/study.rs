@@ -192,31 +192,41 @@ fn assert_report(html: &str) {
     assert_balanced(html);
 }
 
-/// The words that each kernel of `rays` loads and stores, counted by hand.
+/// The words that each kernel of `rays` moves, counted by hand: of paths that it takes, of those that it sends on, and of queues.
 #[test]
 fn bytes_moved_are_those_counted_by_hand() {
     let folder = Folder::new("bytes");
-    let variant = "[[variant]]\nname = \"rays\"\npipeline = \"rays\"\nlayout = \"soa\"\n";
-    let scene = "[[scene]]\nname = \"cornell_box\"\nsize = [32, 24]\nspp = 2\nset = { max_edges = 1 }\n";
+    let variant = "[[variant]]\nname = \"rays\"\npipeline = \"rays\"\nlayout = \"soa\"\nschedule = \"ordered\"\n";
+    let scene = "[[scene]]\nname = \"cornell_box\"\nsize = [32, 24]\nspp = 2\nset = { max_edges = 2 }\n";
     let (outcome, _) = run_small(&folder, &format!("title = \"Bytes\"\n{variant}{scene}"));
     let profile = outcome.results.runs[0].measured.kernel_profile.as_ref().expect("studies profile kernels");
-    let (position, direction, hit, length) = (3, 3, 4, 1);
+    let kernel = |name: &str| profile.kernels.iter().find(|kernel| kernel.name == name).expect("a kernel of `rays`");
+    let taken = |name: &str| kernel(name).entries_per_sample;
+    let (position, direction, hit, length) = (3.0, 3.0, 4.0, 1.0);
+    let ray = position + direction + length;
+    let again = taken("trace_eye") - 1.0;
+    assert!(taken("emit_eye") == 1.0 && taken("probe") == taken("trace_eye"));
+    assert!(again > 0.1 && again < taken("bounce") && taken("bounce") <= taken("probe"), "{again}");
+    // A place knows its slot; what leads to `trace_eye` writes that, and a ray, to where the path stands then.
+    let (entry, slot) = (1.0, 1.0);
     let by_hand = [
-        ("emit_eye", 0, position + direction + length),
-        ("trace_eye", position + direction, hit),
-        ("probe", position + direction, 0),
-        // Where the walk goes on the origin is written, and elsewhere nobody needs it.
-        ("bounce", direction + hit + length, position + direction + length),
+        ("emit_eye", ray, slot),
+        ("trace_eye", taken("trace_eye") * (position + direction + hit), taken("trace_eye") * (slot + entry)),
+        ("probe", taken("probe") * (position + direction), taken("probe") * (entry + slot) + taken("bounce") * entry),
+        (
+            "bounce",
+            taken("bounce") * (direction + hit + length) + again * ray,
+            taken("bounce") * (entry + slot) + again * slot,
+        ),
     ];
-    let mut bytes = 0.0;
-    for (name, loads, stores) in by_hand {
-        let kernel = profile.kernels.iter().find(|kernel| kernel.name == name).expect("a kernel of `rays`");
-        assert_eq!((kernel.load_bytes, kernel.store_bytes), (4 * loads, 4 * stores), "{name}");
-        let taken = kernel.entries_per_sample;
-        assert!(if name == "bounce" { taken > 0.5 && taken <= 1.0 } else { taken == 1.0 }, "{name} takes {taken}");
-        bytes += taken * f64::from(4 * (loads + stores));
+    for (name, state, queues) in by_hand {
+        let of = kernel(name);
+        for (bytes, words) in [(of.state_bytes_per_sample, state), (of.queue_bytes_per_sample, queues)] {
+            assert!((bytes / (4.0 * words) - 1.0).abs() < 1e-9, "{name}: {bytes} for {} by hand", 4.0 * words);
+        }
     }
-    assert!((profile.bytes_per_sample() / bytes - 1.0).abs() < 1e-12, "{} for {bytes}", profile.bytes_per_sample());
+    let bytes: f64 = by_hand.iter().map(|(_, state, queues)| 4.0 * (state + queues)).sum();
+    assert!((profile.bytes_per_sample() / bytes - 1.0).abs() < 1e-9, "{} for {bytes}", profile.bytes_per_sample());
 }
 
 #[test]
@@ -257,11 +267,14 @@ fn assert_kernels(run: &Run) {
     assert!((ended / traced - 1.0).abs() < 1e-9, "what is traced hits or misses");
     let visibility = run.measured.rays.visibility as f64 / run.measured.samples as f64;
     let resolved: f64 = of("resolve_connection").iter().sum();
+    let records = kernel("resolve_connection").queue_bytes_per_sample / resolved;
+    assert!((records - 44.0).abs() < 1e-9, "{records} bytes a record: origin, direction, distance, light, pixel");
     assert!((resolved / visibility - 1.0).abs() < 1e-9, "a ray a connection");
     for kernel in &profile.kernels {
         assert!(kernel.compile_seconds > 0.0 && kernel.spirv_bytes > 100, "{kernel:?}");
-        let bytes = kernel.entries_per_sample * f64::from(kernel.load_bytes + kernel.store_bytes);
-        assert_eq!(kernel.gb_per_s.is_some(), bytes > 0.0, "{kernel:?}");
+        let state = kernel.entries_per_sample * f64::from(kernel.load_bytes + kernel.store_bytes);
+        assert!(kernel.state_bytes_per_sample >= state, "what moves on comes on top: {kernel:?}");
+        assert_eq!(kernel.gb_per_s.is_some(), kernel.bytes_per_sample() > 0.0, "{kernel:?}");
         assert!(kernel.gb_per_s.is_none_or(|rate| rate > 0.0 && rate.is_finite()));
     }
 }
