@@ -40,6 +40,16 @@ fn paths_go_on_where_they_stand_in_the_queue() {
     assert_eq!(plan.dense, Some(1), "behind `emit`");
 }
 
+/// `shade` does not touch the density that `emit` wrote: it takes it along.
+#[test]
+fn what_lives_on_untouched_is_taken_along() {
+    for (order, lane) in [("aos", "4"), ("soa", "1"), ("aosoa32", "2")] {
+        let plan = with_an_inner_loop(&[DENSE, ("layout.order", order), ("layout.lane", lane)]);
+        let moved = |name: &str| kernel(&plan, name).moved_bytes;
+        assert!(moved("shade") == moved("emit") && moved("emit") == moved("emit_first"), "{order}, {lane}");
+    }
+}
+
 /// A stage behind the loop that begins another eye walk of the same path.
 const AGAIN: &str = r"
 import package::outcome::DONE;
