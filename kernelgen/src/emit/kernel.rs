@@ -125,9 +125,10 @@ impl Frame<'_> {
             let gap = if declared.is_empty() { "" } else { "\n" };
             format!("    if {condition} {{\n{found}{numbered}{gap}{declared}{loaded}\n{body}{stored}    }}\n")
         };
+        let onward = if moves { format!(", {} where it goes on", access.moved_bytes) } else { String::new() };
         format!(
             "{imports}\n\
-             /// {heading} of a path: {} bytes of state in, {} out.\n\
+             /// {heading} of a path: {} bytes of state in, {} out{onward}.\n\
              @compute @workgroup_size({workgroup})\n\
              fn {kernel}_main{PARAMETERS} {{\n    \
                  let index = (group.y * groups.x + group.x) * {workgroup}u + lane;\n\
