@@ -8,7 +8,7 @@ use crate::execute::{Compiled, Executor, IN_FLIGHT, Pass};
 use crate::film::{Accumulator, Totals, shares};
 use crate::occupancy::Occupancy;
 use crate::profile::Profile;
-use crate::tallies::{PILOT_SEED, PILOT_SLOTS, Tallies};
+use crate::tallies::{PILOT_SEED, Tallies};
 use kernelgen::plan::{Layers, Plan, Role};
 use std::time::Instant;
 
@@ -156,7 +156,7 @@ impl Session {
             buffers.of(plan, Role::Film)?,
         )?;
         let executor = Executor::new(gpu, plan, &buffers)?;
-        let tallies = Tallies::new(plan, &buffers);
+        let tallies = Tallies::new(plan, &buffers, pixels);
         gpu.check()?;
         let slots = usable_slots(plan, path_count);
         Ok(Self {
@@ -275,9 +275,9 @@ impl Session {
             return Ok(());
         };
         tallies.begin_pilot(&self.gpu);
-        let mut done = 0;
-        while done < PILOT_SLOTS {
-            let active = self.pass_limit.min(PILOT_SLOTS - done);
+        let (mut done, slots) = (0, tallies.pilot_slots());
+        while done < slots {
+            let active = self.pass_limit.min(slots - done);
             self.discarded(done, active)?;
             done += active;
         }

@@ -9,12 +9,15 @@ use crate::error::Error;
 use kernelgen::plan::{Plan, Role};
 use serde::{Deserialize, Serialize};
 
-/// Path slots of the pilot.
-pub const PILOT_SLOTS: u32 = 65_536;
 /// What the seed is combined with for the pilot, so that its paths are not those of the picture.
 pub const PILOT_SEED: u32 = 0x7069_6c6f;
 /// Slots after which the 32-bit counts are taken over: a path may count up to 15 times at one index.
 const MOST_SLOTS: u64 = 1 << 28;
+
+/// Path slots of the pilot of a picture of so many pixels: a sample of each, but enough to tell rates by, and no more than that takes.
+pub fn pilot_slots(pixels: u32) -> u32 {
+    pixels.clamp(4096, 65_536)
+}
 
 /// What the samples of a picture counted, the pilot left out. Saved with the picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,6 +40,8 @@ pub struct Tallies {
     rates: Option<wgpu::Buffer>,
     /// Where each tally begins.
     firsts: Vec<usize>,
+    /// Slots of the pilot, and what it counted.
+    pilot_slots: u32,
     pilot: Vec<u64>,
     tallied: Tallied,
     /// Slots submitted since the counts were last taken over.
@@ -44,14 +49,15 @@ pub struct Tallies {
 }
 
 impl Tallies {
-    /// The tallies of a plan; `None` where it has none.
-    pub fn new(plan: &Plan, buffers: &Buffers) -> Option<Self> {
+    /// The tallies of a plan, for a picture of so many pixels; `None` where it has none.
+    pub fn new(plan: &Plan, buffers: &Buffers, pixels: u32) -> Option<Self> {
         let words = plan.tallies.iter().map(|tally| tally.size as usize).sum();
         let zeros = vec![0; words];
         (words > 0).then(|| Self {
             counts: buffers.of(plan, Role::TallyCounts).ok().cloned(),
             rates: buffers.of(plan, Role::TallyRates).ok().cloned(),
             firsts: plan.tallies.iter().map(|tally| tally.first as usize).collect(),
+            pilot_slots: pilot_slots(pixels),
             pilot: zeros.clone(),
             tallied: Tallied { counts: zeros.clone(), slots: 0, rated_counts: zeros, rated_slots: 0 },
             pending: 0,
@@ -88,6 +94,11 @@ impl Tallies {
     /// Notes that a pass of `active` slots was submitted.
     pub fn submitted(&mut self, active: u32) {
         self.pending += u64::from(active);
+    }
+
+    /// Path slots of the pilot.
+    pub fn pilot_slots(&self) -> u32 {
+        self.pilot_slots
     }
 
     /// Rates of 1 for the pilot, which has no samples before it.
@@ -142,7 +153,7 @@ impl Tallies {
     }
 
     fn publish(&self, gpu: &Gpu) {
-        let slots = (u64::from(PILOT_SLOTS) + self.tallied.rated_slots) as f64;
+        let slots = (u64::from(self.pilot_slots) + self.tallied.rated_slots) as f64;
         let counts = self.pilot.iter().zip(&self.tallied.rated_counts);
         self.write_rates(gpu, counts.map(|(pilot, rated)| (pilot + rated) as f64 / slots).collect());
     }

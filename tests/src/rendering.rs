@@ -301,6 +301,12 @@ impl Job {
         self.generate(&self.load()).unwrap_or_else(|refusal| panic!("{refusal}")).report
     }
 
+    /// The kernels, and how they are run.
+    #[track_caller]
+    pub fn plan(&self) -> Plan {
+        self.generate(&self.load()).unwrap_or_else(|refusal| panic!("{refusal}")).plan
+    }
+
     fn generate(&self, scene: &Scene) -> Result<Generated, String> {
         let mut library = self.library.clone();
         let selection =

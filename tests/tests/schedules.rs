@@ -158,6 +158,24 @@ fn sorted_paths_shade_like_their_neighbours() {
     assert!(unsorted > 10 * sorted, "{unsorted} in the order of slots, {sorted} sorted");
 }
 
+/// The schedule for GPUs sorts by material what waits to be shaded where there is solid glass, and no state stays behind; else nothing.
+#[test]
+fn paths_are_sorted_behind_solid_glass_alone() {
+    let kernels = |pipeline: &str, scene: &str, schedule: &str| -> Vec<String> {
+        let report =
+            Job::of_file(shipped(scene)).pipeline(pipeline).layout("split_compact").schedule(schedule).report();
+        report.kernels.into_iter().map(|kernel| kernel.name).collect()
+    };
+    for (pipeline, scene, sorted) in
+        [("pt", "bottle", true), ("pt", "cornell_box", false), ("sbdpt", "bottle", false), ("lt", "bottle", false)]
+    {
+        let names = kernels(pipeline, scene, "ordered");
+        let shade = names.iter().find(|name| name.starts_with("count_keys_"));
+        assert_eq!(shade.is_some(), sorted, "{pipeline}, {scene}: {names:?}");
+    }
+    assert_eq!(kernels("pt", "bottle", "ordered"), kernels("pt", "bottle", "sorted_material"));
+}
+
 /// As if a pass had traced almost as many rays as 32 bits hold before it began.
 const TRACED_BEFORE: u64 = 0xffff_fff0;
 

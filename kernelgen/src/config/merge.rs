@@ -21,7 +21,8 @@ pub const PIPELINE: Axis = Axis {
     noun: "pipeline",
     folder: "pipelines",
     keys: &[
-        "start", "rounds", "inner", "params", "records", "state", "streams", "tallies", "layers", "stored", "stages",
+        "start", "rounds", "inner", "keys", "params", "records", "state", "streams", "tallies", "layers", "stored",
+        "stages",
     ],
 };
 /// Where fields live.

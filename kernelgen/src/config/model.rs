@@ -65,6 +65,8 @@ pub struct Pipeline {
     pub rounds: Spanned<String>,
     /// A loop inside the rounds.
     pub inner: Option<Inner>,
+    /// Keys that a schedule may sort by also where no stage declares them.
+    pub keys: Vec<Spanned<String>>,
     /// Parameters by name.
     pub params: IndexMap<String, Param>,
     /// Records by name.

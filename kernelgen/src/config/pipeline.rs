@@ -25,6 +25,7 @@ pub fn read(file: &AxisFile, top: &Section<'_>, findings: &mut Findings) -> Pipe
         rounds: required_text(top, "rounds", rounds_help, findings),
         inner: inner(top, findings),
         records: records(top, &params, findings),
+        keys: top.get("keys").and_then(|keys| keys.texts(findings)).unwrap_or_default(),
         params,
         state: state(top, findings),
         streams: streams(top, findings),

@@ -106,11 +106,13 @@ fn check_groups(variant: &Variant, findings: &mut Findings) {
     }
 }
 
-/// Keys that queues are sorted by: some stage declares each, and there are queues.
+/// Keys that queues are sorted by: some stage declares each, or the pipeline as a whole, and there are queues.
 fn check_keys(variant: &Variant, findings: &mut Findings) {
     let Schedule { sort, queue, .. } = &variant.schedule;
-    let declared = variant.pipeline.stages.values().flat_map(|stage| &stage.sort);
-    let declared: IndexMap<String, Span> = declared.map(|(key, function)| (key.clone(), function.span)).collect();
+    let of_stages = variant.pipeline.stages.values().flat_map(|stage| &stage.sort);
+    let of_stages = of_stages.map(|(key, function)| (key.clone(), function.span));
+    let of_pipeline = variant.pipeline.keys.iter().map(|key| (key.value.clone(), key.span));
+    let declared: IndexMap<String, Span> = of_pipeline.chain(of_stages).collect();
     for key in sort {
         check_known(("K0228", "key"), key, &declared, findings);
     }

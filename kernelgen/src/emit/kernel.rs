@@ -51,6 +51,8 @@ pub(super) struct Filling {
     pub body: String,
     /// The stages that wait for paths of this kernel, and the condition on which a path goes there.
     pub targets: Vec<(String, String)>,
+    /// Whether there is one such stage, and every path goes there.
+    pub all_go_on: bool,
     /// Lines that all invocations reach.
     pub end: String,
     /// Whether a stage counts something in a tally.
@@ -63,6 +65,7 @@ pub(super) fn stage_kernel(frame: Frame<'_>, stage: &WiredStage) -> String {
         heading: format!("Stage `{}`", frame.entry),
         instances: stage.instances.iter().cloned().collect(),
         targets: targets(stage),
+        all_go_on: stage.outcomes_by_target().len() == 1 && !stage.may_end(),
         counts: stage.counts,
         ..Filling::default()
     };
@@ -83,7 +86,7 @@ impl Frame<'_> {
     pub(super) fn fill(self, filling: Filling) -> String {
         let Frame { kernel, queues, access, packs, next, .. } = self;
         let moves = self.moves(&filling.targets);
-        let Filling { mut imports, heading, locals, instances, body, targets, end, counts } = filling;
+        let Filling { mut imports, heading, locals, instances, body, targets, all_go_on, end, counts } = filling;
         let workgroup = queues.workgroup;
         let (condition, found) = self.path(&mut imports);
         for buffer in &access.buffers {
@@ -102,7 +105,11 @@ impl Frame<'_> {
             taken = take_next(&targets, &mut imports);
             targets.push((start.to_owned(), "again".to_owned()));
         }
-        let enqueue = taken + &self.leave(&targets, &mut imports);
+        let numbered = moves && all_go_on && self.source == Source::Slots && self.gathered.is_empty();
+        let enqueue = match targets.as_slice() {
+            [(target, wanted)] if numbered => self.begin_turn(target, wanted, &mut imports),
+            _ => taken + &self.leave(&targets, &mut imports),
+        };
         let declared = declared(&instances, &mut imports);
         let loaded = loaded(access, &mut imports);
         let stored = lines(&access.stores);
@@ -244,6 +251,7 @@ impl Frame<'_> {
             let rank = format!("ranks[{}]", asks.len());
             if queues.is_first_of_dense(target) {
                 asks.push(format!("ask_place({constant}, {wanted}, lane)"));
+                imports.add("queue", ["place_of"]);
                 moved = self.move_on(wanted, &format!("place_of({constant}, {rank}, lane)"), imports);
                 continue;
             }
@@ -280,10 +288,17 @@ impl Frame<'_> {
         )
     }
 
+    /// The paths of all slots go on with the first stage of a loop whose paths stand side by side: as their slots do.
+    fn begin_turn(&self, target: &str, wanted: &str, imports: &mut Imports) -> String {
+        let constant = stage_constant(target);
+        imports.add("queue", ["all_stand", constant.as_str()]);
+        format!("\n    all_stand({constant}, index);\n{}", self.move_on(wanted, "index", imports))
+    }
+
     /// A path that goes on with the first stage of a loop whose paths stand side by side: its state is stored where it stands then.
     fn move_on(&self, wanted: &str, place: &str, imports: &mut Imports) -> String {
         imports.add("pass", ["path_id", "walk_place"]);
-        imports.add("queue", ["next_walk_places", "place_of", "walk_slots"]);
+        imports.add("queue", ["next_walk_places", "walk_slots"]);
         format!(
             "    if {wanted} {{\n        \
                      walk_place = next_walk_places() + {place};\n        \

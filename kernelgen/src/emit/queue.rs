@@ -554,6 +554,13 @@ fn next_walk_places() -> u32 {
     return path_count - walk_places();
 }
 
+/// The paths of all slots in use stand in a queue, which is empty.
+fn all_stand(number: u32, slot: u32) {
+    if slot == 0u {
+        atomicStore(&control[waiting_word(number)], pass_info.slots);
+    }
+}
+
 /// Begins a turn.
 fn turn_walk_places() {
     atomicStore(&control[CONTROL_WALKS], next_walk_places());

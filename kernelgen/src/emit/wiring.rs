@@ -308,7 +308,7 @@ impl Wirer<'_> {
         Ok(params)
     }
 
-    /// The first key of the schedule that the stage declares.
+    /// The first key of the schedule that the stage declares, unless it depends on nothing: in this scene it tells no paths apart then.
     fn wire_key(&mut self, name: &str, stage: &Stage) -> Result<Option<WiredKey>, Vec<Diagnostic>> {
         let variant = self.variant;
         let mut asked = variant.schedule.sort.iter().filter_map(|key| stage.sort.get(&key.value));
@@ -325,8 +325,10 @@ impl Wirer<'_> {
             None,
         )?;
         check_key(function, &analysed)?;
-        let instances = instances(variant, stage, &analysed.signature);
-        Ok(Some(WiredKey { entry: analysed.entry, instances, reads: analysed.facts.reads }))
+        let Analysed { entry, signature, facts, .. } = analysed;
+        let tells_apart = !facts.reads.is_empty() || !facts.globals.is_empty();
+        let instances = instances(variant, stage, &signature);
+        Ok(tells_apart.then_some(WiredKey { entry, instances, reads: facts.reads }))
     }
 
     /// A stage that paths only come to inside a kernel has nothing to sort.

@@ -1,5 +1,7 @@
-//! Keys by which a schedule may sort the paths that wait for a stage: `sort.material` and `sort.ray` in a pipeline. They count modulo 256.
+//! Keys by which a schedule may sort the paths that wait for a stage: `sort.material`, `sort.glass` and `sort.ray` in a pipeline. They
+//! count modulo 256.
 
+import package::features::HAS_SOLID_GLASS;
 import package::real::{real, vec3r};
 import package::state::Walk;
 import package::scene::scene;
@@ -8,6 +10,15 @@ import package::surface::geometry::load_triangle;
 /// The material that the walk has hit: those that shade alike come together (Laine et al. 2013).
 fn material_key(walk: ptr<function, Walk>) -> u32 {
     return load_triangle(walk.hit.prim).material;
+}
+
+/// As `material_key` in scenes with solid glass, and the same for all paths in others. What leaves a solid together is traced together
+/// where paths move with their state; elsewhere the order of arrival is worth more.
+fn glass_key(walk: ptr<function, Walk>) -> u32 {
+    if HAS_SOLID_GLASS {
+        return material_key(walk);
+    }
+    return 0u;
 }
 
 /// Where the next ray goes and comes from: the octant of its direction, then five bits of its origin on a Morton curve through the cube

@@ -21,7 +21,7 @@ fn paths_go_on_where_they_stand_in_the_queue() {
         let text = &kernel(&plan, name).module;
         assert!(text.contains(&format!("walk_place = {place};\n        {found}")), "{text}");
     }
-    for name in ["emit", "emit_first", "shade"] {
+    for name in ["emit", "shade"] {
         let kernel = kernel(&plan, name);
         let (_, behind) = kernel.module.split_once(moves).unwrap_or_else(|| panic!("{}", kernel.module));
         assert!(behind.contains("state[state_address(") && !kernel.module.contains("enqueue(QUEUE_TRACE"));
@@ -38,6 +38,24 @@ fn paths_go_on_where_they_stand_in_the_queue() {
     assert!(turns("prepare_trace") && !turns("prepare_shade") && !turns("prepare_emit"));
     assert_eq!(per_path(&plan, "state"), 2 * u64::from(plan.bytes_per_path), "places of two turns");
     assert_eq!(plan.dense, Some(1), "behind `emit`");
+}
+
+/// Where no path ends in the kernel that a pass starts with, nothing has to be counted.
+#[test]
+fn paths_of_all_slots_stand_as_their_slots_do() {
+    let first = |stages: &str| {
+        let result = crate::generate(&sources(&inner_loop_pipeline(), LAYOUT, stages), &selection(&[DENSE]));
+        let plan = result.unwrap_or_else(|refusal| panic!("{}", refusal.render(false))).plan;
+        kernel(&plan, "emit_first").module.clone()
+    };
+    let all = first(STAGES);
+    let stands = "all_stand(QUEUE_TRACE, index);\n    if outcome == EMITTED {\n        \
+                  walk_place = next_walk_places() + index;\n        walk_slots[walk_place] = path_id;\n";
+    assert!(all.contains(stands) && !all.contains("take_places") && !all.contains("place_of"), "{all}");
+    let may_end = "if path.sample > 3u {\n        return END;\n    }\n    return EMITTED;";
+    let ends = STAGES.replace("return EMITTED;", may_end).replace("outcome::{", "outcome::{END, ");
+    let some = first(&ends);
+    assert!(some.contains("place_of(QUEUE_TRACE, ranks[0], lane)") && !some.contains("all_stand"), "{some}");
 }
 
 /// `shade` does not touch the density that `emit` wrote: it takes it along.

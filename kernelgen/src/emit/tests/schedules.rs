@@ -71,6 +71,11 @@ fn with_keys(set: &[(&str, &str)], key: &str) -> Result<Generated, Refusal> {
     crate::generate(&sources(&pipeline, LAYOUT, &functions), &selection(set))
 }
 
+/// The texts of all kernels.
+fn modules(plan: &Plan) -> Vec<&str> {
+    plan.kernels.iter().map(|kernel| kernel.module.as_str()).collect()
+}
+
 fn sorted(set: &[(&str, &str)]) -> Generated {
     with_keys(set, "return walk.hit.prim;").unwrap_or_else(|refusal| panic!("{set:?}\n{}", refusal.render(false)))
 }
@@ -124,12 +129,28 @@ fn what_is_not_sorted_has_no_trace_of_keys() {
         assert!(plan.kernels.iter().all(|kernel| !kernel.module.contains("key_bins")), "{set:?}");
         assert!(plan.buffers.iter().all(|buffer| !buffer.name.starts_with("key")), "{set:?}");
     }
+    let constant = with_keys(&[("schedule.sort", "prim")], "return 7u;")
+        .unwrap_or_else(|refusal| panic!("{}", refusal.render(false)));
+    assert_eq!(modules(&constant.plan), modules(&sorted(&[]).plan), "a key that is the same for all paths");
     let plan = sorted(&[("schedule.sort", "pole"), fused, inline]).plan;
     assert_eq!(
         kernel(&plan, "count_keys_trace").load_bytes,
         16,
         "the entry of a fused kernel: the lane of `direction`"
     );
+}
+
+/// A schedule may name keys that a pipeline knows and none of its stages has.
+#[test]
+fn keys_of_the_pipeline_need_no_stage() {
+    let generate = |keys: &str| {
+        let pipeline = PIPELINE.replacen("start", &format!("{keys}start"), 1);
+        crate::generate(&sources(&pipeline, LAYOUT, STAGES), &selection(&[("schedule.sort", "prim")]))
+    };
+    let known = generate("keys = [\"prim\"]\n").unwrap_or_else(|refusal| panic!("{}", refusal.render(false)));
+    assert_eq!(modules(&known.plan), modules(&generated(&[]).plan));
+    let text = generate("").expect_err("no such key").render(false);
+    assert!(text.contains("K0228"), "{text}");
 }
 
 #[test]
