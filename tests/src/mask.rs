@@ -5,7 +5,7 @@ use crate::rendering::Job;
 
 const PROBE: &str = include_str!("../wgsl/probe_lambert.wgsl");
 /// Rays through a pixel: all of them must see such a surface.
-const RAYS: u32 = 64;
+const RAYS: u32 = 16;
 
 /// A mark on every pixel.
 #[derive(Clone, Debug)]

@@ -52,8 +52,8 @@ fn cornell_box_panorama() {
 
 #[test]
 fn cbox_hole() {
-    assert_converges_to("cbox_hole", "pt", 4, 512);
-    assert_converges_to("cbox_hole", "sbdpt", 4, 64);
+    assert_converges_to("cbox_hole", "pt", 4, 256);
+    assert_converges_to("cbox_hole", "sbdpt", 4, 32);
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn bottle_light_has_the_mean_of_the_reference() {
     let Some(shared) = shared() else { return };
     let reference = reference(&shared, "bottle_light");
     let wanted = reference.image(&shared).mean_estimate();
-    for (pipeline, samples) in [("pt", 256), ("sbdpt", 64)] {
+    for (pipeline, samples) in [("pt", 96), ("sbdpt", 24)] {
         let rendering = reference.job(&shared, 4).pipeline(pipeline).samples(samples).render();
         let found = rendering.pixels.mean_estimate();
         assert_eq!(rendering.rejected, 0);
