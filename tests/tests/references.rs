@@ -28,8 +28,8 @@ fn assert_agrees(rendering: &Rendering, expected: &Pixels, name: &str) {
 
 #[test]
 fn cornell_box() {
-    assert_converges_to("cornell_box", "pt", 4, 512);
-    assert_converges_to("cornell_box", "sbdpt", 4, 64);
+    assert_converges_to("cornell_box", "pt", 4, 256);
+    assert_converges_to("cornell_box", "sbdpt", 4, 32);
 }
 
 #[test]
