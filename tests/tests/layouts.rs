@@ -75,6 +75,7 @@ fn every_layout_under(schedules: &[&str], pipeline: &str) -> Vec<&'static str> {
     let job = job(pipeline).size(20, 12).samples(2);
     let of = |layout: &str, schedule: &str| job.clone().layout(layout).schedule(schedule);
     let plan = |job: &Job| format!("{:?}", job.plan());
+    let traced = |rendering: &Rendering| (rendering.rays, rendering.visibility);
     let expected = of("aos", "wavefront");
     let mut rendered = BTreeSet::from([plan(&expected)]);
     let expected = expected.render();
@@ -84,8 +85,11 @@ fn every_layout_under(schedules: &[&str], pipeline: &str) -> Vec<&'static str> {
         for layout in &fitting {
             let job = of(layout, schedule);
             if rendered.insert(plan(&job)) {
-                let same = job.render().sums == expected.sums;
-                assert!(same, "{pipeline}, {layout}, {schedule}: the image is not that of aos, wavefront");
+                let rendering = job.render();
+                let what = format!("{pipeline}, {layout}, {schedule}");
+                assert!(rendering.sums == expected.sums, "{what}: the image is not that of aos, wavefront");
+                // A path that is lost outside of the box leaves the image as it is.
+                assert_eq!(traced(&rendering), traced(&expected), "{what}: all rays, and visibility rays among them");
             }
         }
     }
