@@ -53,6 +53,14 @@ fn fits(job: &Job) -> bool {
     false
 }
 
+/// The same image, and the same rays: a path that is lost outside of the box leaves the image as it is.
+#[track_caller]
+fn assert_same(rendering: &Rendering, expected: &Rendering, what: &str) {
+    assert!(rendering.sums == expected.sums, "{what}: the image is not that of aos");
+    let traced = |rendering: &Rendering| (rendering.rays, rendering.visibility);
+    assert_eq!(traced(rendering), traced(expected), "{what}: all rays, and visibility rays among them");
+}
+
 /// Those that place fields most unlike `aos`, with the pipelines that are not rendered by every layout under every schedule.
 #[test]
 fn unlike_layouts_give_the_same_bits() {
@@ -65,7 +73,7 @@ fn unlike_layouts_give_the_same_bits() {
     ] {
         let expected = job(pipeline).layout("aos").render();
         assert!(expected.sums.iter().any(|&sum| sum != 0), "{pipeline}: a black image proves nothing");
-        assert!(job(pipeline).layout(layout).render().sums == expected.sums, "{pipeline}: the image of {layout}");
+        assert_same(&job(pipeline).layout(layout).render(), &expected, &format!("{pipeline}, {layout}"));
     }
 }
 
@@ -75,7 +83,6 @@ fn every_layout_under(schedules: &[&str], pipeline: &str) -> Vec<&'static str> {
     let job = job(pipeline).size(20, 12).samples(2);
     let of = |layout: &str, schedule: &str| job.clone().layout(layout).schedule(schedule);
     let plan = |job: &Job| format!("{:?}", job.plan());
-    let traced = |rendering: &Rendering| (rendering.rays, rendering.visibility);
     let expected = of("aos", "wavefront");
     let mut rendered = BTreeSet::from([plan(&expected)]);
     let expected = expected.render();
@@ -85,11 +92,7 @@ fn every_layout_under(schedules: &[&str], pipeline: &str) -> Vec<&'static str> {
         for layout in &fitting {
             let job = of(layout, schedule);
             if rendered.insert(plan(&job)) {
-                let rendering = job.render();
-                let what = format!("{pipeline}, {layout}, {schedule}");
-                assert!(rendering.sums == expected.sums, "{what}: the image is not that of aos, wavefront");
-                // A path that is lost outside of the box leaves the image as it is.
-                assert_eq!(traced(&rendering), traced(&expected), "{what}: all rays, and visibility rays among them");
+                assert_same(&job.render(), &expected, &format!("{pipeline}, {layout}, {schedule}"));
             }
         }
     }

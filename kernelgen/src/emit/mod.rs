@@ -2,6 +2,7 @@
 
 mod chain;
 mod contract;
+mod control;
 mod dense;
 mod entry;
 mod film;
@@ -147,7 +148,7 @@ fn add_config_modules(
         ("features", modules::features(&variant.effects)),
         ("params", modules::params(&pipeline.params)),
         ("pass", modules::pass(variant.schedule.regenerate.value > 1)),
-        ("control", queue::control_module(&queues, 0)),
+        ("control", control::module(&queues, 0)),
         ("film", film::module(variant.schedule.accumulate, layers)),
         ("streams", stream::analysis_module(pipeline)),
         ("stored", stored::module(pipeline, &BTreeMap::new())),
@@ -184,7 +185,7 @@ fn add_state_modules(
 ) {
     let texts = [
         ("pass", modules::pass(queues.numbers_paths())),
-        ("control", queue::control_module(queues, rounds)),
+        ("control", control::module(queues, rounds)),
         ("next", chain::module(wiring)),
         ("queue", queue::queue_module(queues)),
         ("sort", sort::module(queues.workgroup)),

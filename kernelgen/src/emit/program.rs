@@ -1,6 +1,7 @@
 //! From kernel texts to the plan: linking, validation, buffers, the order of steps.
 
 use super::chain;
+use super::control;
 use super::fusion::Chain;
 use super::housekeeping::{self, Entries, Prepared};
 use super::kernel::{self, Frame, Source};
@@ -440,8 +441,8 @@ impl Builder<'_> {
         let plan = Plan {
             kernels: kernels.collect(),
             program,
-            counters: queue::counters().collect(),
-            entries: queue::entry_words(),
+            counters: control::counters().collect(),
+            entries: control::entry_words(),
             pushed_bytes,
             dense,
             tallies,
